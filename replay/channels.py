@@ -1,0 +1,245 @@
+"""The only table of topics: what each channel carries, how its rows are told apart
+and how far two runs may differ before a person has to look.
+
+A topic is a pattern; `{name}` stands for one path element that a run or a
+receiver chooses. Nothing else in the package spells a topic.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from replay.errors import SchemaError
+
+
+class Difference(enum.Enum):
+    """How two values of a field are subtracted."""
+
+    LINEAR = "linear"
+    ANGLE = "angle"  # wrapped to plus or minus pi
+    ROTATION = "rotation"  # of quaternions: the angle between the two attitudes
+    EXACT = "exact"  # enumerations, counts, text
+    COVARIANCE = "covariance"  # by definiteness and extreme generalised eigenvalues
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far a field may differ.
+
+    Attributes
+    ----------
+    absolute : float
+        In `unit`; for COVARIANCE, how far a generalised eigenvalue may stand from one.
+    unit : str
+        Unit of the field.
+    difference : Difference
+        How two values are subtracted.
+    """
+
+    absolute: float
+    unit: str
+    difference: Difference = Difference.LINEAR
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class ChannelSpec:
+    """One kind of channel.
+
+    Attributes
+    ----------
+    name : str
+        How code refers to it.
+    topic : str
+        Pattern with `{...}` for the parts that are chosen.
+    message : str
+        Full name of the protobuf message.
+    key : tuple of str
+        Fields that tell rows of one valid time apart.
+    tolerances : mapping of field name to Tolerance
+        A field that is not named is compared exactly.
+    about : str
+        One line for a person.
+    """
+
+    name: str
+    topic: str
+    message: str
+    about: str
+    key: tuple[str, ...] = ()
+    tolerances: Mapping[str, Tolerance] = dataclasses.field(default_factory=dict)
+
+    def at(self, **parts: str) -> str:
+        """Topic with its parts filled in."""
+        return self.topic.format(**parts)
+
+    def matches(self, topic: str) -> bool:
+        """Whether a topic is of this kind."""
+        return _pattern(self.topic).fullmatch(topic) is not None
+
+    def parts(self, topic: str) -> dict[str, str]:
+        """The chosen parts of a topic of this kind."""
+        match = _pattern(self.topic).fullmatch(topic)
+        if match is None:
+            raise SchemaError(f"{topic} is no {self.topic}")
+        return match.groupdict()
+
+
+def _pattern(topic: str) -> re.Pattern[str]:
+    return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>[^/]+)", re.escape(topic)))
+
+
+_M = Tolerance(1e-4, "m")
+_M_S = Tolerance(1e-4, "m/s")
+_RAD = Tolerance(1e-6, "rad", Difference.ANGLE)
+_M2 = Tolerance(1e-6, "m^2")
+
+IMU: Final = ChannelSpec(
+    "IMU",
+    "/imu/raw",
+    "replay.ImuSample",
+    "inertial samples",
+    tolerances={
+        "angular_rate_body_rad_s": Tolerance(1e-9, "rad/s"),
+        "specific_force_body_m_s2": Tolerance(1e-9, "m/s^2"),
+    },
+)
+GNSS_FIX: Final = ChannelSpec(
+    "GNSS_FIX",
+    "/gnss/{receiver}/fix",
+    "replay.GnssFix",
+    "positions and velocities of a GNSS antenna",
+    tolerances={
+        "position_ecef_m": _M,
+        "velocity_ecef_m_s": _M_S,
+        "position_covariance_enu_m2": _M2,
+        "velocity_covariance_enu_m2_s2": Tolerance(1e-6, "m^2/s^2"),
+    },
+)
+GNSS_OBS: Final = ChannelSpec(
+    "GNSS_OBS",
+    "/gnss/{receiver}/obs",
+    "replay.GnssObservation",
+    "code, carrier, Doppler and strength per satellite and signal",
+    key=("satellite", "signal"),
+    tolerances={
+        "pseudorange_m": Tolerance(1e-4, "m"),
+        "carrier_phase_cycles": Tolerance(1e-4, "cycle"),
+        "doppler_hz": Tolerance(1e-4, "Hz"),
+        "cn0_dbhz": Tolerance(1e-3, "dB-Hz"),
+    },
+)
+TRUTH: Final = ChannelSpec(
+    "TRUTH",
+    "/truth",
+    "replay.Truth",
+    "the best knowledge of position, velocity and attitude",
+    tolerances={
+        "position_ecef_m": _M,
+        "velocity_enu_m_s": _M_S,
+        "attitude_rad": _RAD,
+    },
+)
+FILTER_STATE: Final = ChannelSpec(
+    "FILTER_STATE",
+    "/filter/{run}/state",
+    "replay.FilterState",
+    "state of a filter after each epoch",
+    tolerances={
+        "position_ecef_m": _M,
+        "velocity_ecef_m_s": _M_S,
+        "q_body_to_ecef": Tolerance(1e-6, "rad", Difference.ROTATION),
+        "gyro_bias_body_rad_s": Tolerance(1e-8, "rad/s"),
+        "accel_bias_body_m_s2": Tolerance(1e-6, "m/s^2"),
+        "gyro_scale_factor": Tolerance(1e-7, "1"),
+        "accel_scale_factor": Tolerance(1e-7, "1"),
+        "mounting_angles_rad": _RAD,
+    },
+)
+FILTER_COVARIANCE: Final = ChannelSpec(
+    "FILTER_COVARIANCE",
+    "/filter/{run}/covariance",
+    "replay.FilterCovariance",
+    "covariance of a filter's error states after each epoch",
+    tolerances={"upper_triangle": Tolerance(1e-6, "1", Difference.COVARIANCE)},
+)
+FILTER_INNOVATIONS: Final = ChannelSpec(
+    "FILTER_INNOVATIONS",
+    "/filter/{run}/innovations",
+    "replay.Innovation",
+    "every scalar measurement as a filter met it",
+    key=("kind", "axis", "satellite", "signal"),
+    tolerances={
+        "innovation": Tolerance(1e-4, "m"),
+        "innovation_std": Tolerance(1e-4, "m"),
+        "measurement_std": Tolerance(1e-6, "m"),
+        "normalized": Tolerance(1e-3, "1"),
+    },
+)
+FILTER_EVENTS: Final = ChannelSpec(
+    "FILTER_EVENTS",
+    "/filter/{run}/events",
+    "replay.FilterEvent",
+    "alignment, outages, stops, rejections",
+    key=("kind",),
+    tolerances={"value": Tolerance(1e-6, "1")},
+)
+SOLUTION: Final = ChannelSpec(
+    "SOLUTION",
+    "/solution/{run}",
+    "replay.Solution",
+    "position, velocity and attitude with their uncertainty",
+    tolerances={
+        "position_ecef_m": _M,
+        "velocity_enu_m_s": _M_S,
+        "attitude_rad": _RAD,
+        "angular_rate_body_rad_s": Tolerance(1e-8, "rad/s"),
+        "position_covariance_enu_m2": _M2,
+        "velocity_std_enu_m_s": _M_S,
+        "attitude_std_rad": Tolerance(1e-6, "rad"),
+    },
+)
+TRACE: Final = ChannelSpec(
+    "TRACE", "/replay/trace", "replay.Trace", "digests per stage and step", key=("stage",)
+)
+CHECKPOINT: Final = ChannelSpec(
+    "CHECKPOINT",
+    "/replay/checkpoint",
+    "replay.Checkpoint",
+    "states from which a replay can go on",
+    key=("stage",),
+)
+
+# The order is the rank that breaks ties between rows of one time and one depth.
+CHANNELS: Final[tuple[ChannelSpec, ...]] = (
+    IMU,
+    GNSS_OBS,
+    GNSS_FIX,
+    TRUTH,
+    FILTER_INNOVATIONS,
+    FILTER_STATE,
+    FILTER_COVARIANCE,
+    FILTER_EVENTS,
+    SOLUTION,
+    TRACE,
+    CHECKPOINT,
+)
+
+
+def find(topic: str) -> ChannelSpec | None:
+    """Kind of a topic, or None for a topic that this project does not know."""
+    for spec in CHANNELS:
+        if spec.matches(topic):
+            return spec
+    return None
+
+
+def rank(topic: str) -> int:
+    """Place of a topic among rows of one time and depth; unknown topics come last."""
+    for index, spec in enumerate(CHANNELS):
+        if spec.matches(topic):
+            return index
+    return len(CHANNELS)
