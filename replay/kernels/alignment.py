@@ -1,0 +1,236 @@
+"""First attitude of an inertial system: level at rest, heading from the course.
+
+At rest the mean specific force gives roll and pitch and the mean rate the gyro
+bias; attitude then follows the gyros in a level frame of unknown heading until
+the vehicle drives fast and straight enough for the course to be its heading. A
+log that begins in motion is levelled with the acceleration that GNSS sees.
+"""
+
+from numba import njit
+
+from replay.kernels.constraints import is_still, push_sample, window_statistics
+from replay.kernels.covariance import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
+from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
+from replay.kernels.elementary import asin, atan2, sqrt
+from replay.kernels.records import (
+    EVENT_ALIGNED,
+    EVENT_LEVELLED,
+    LEVELLED,
+    RUNNING,
+    WAITING,
+    WINDOW,
+)
+from replay.kernels.rotation import (
+    cross3,
+    euler_from_matrix,
+    matrix_from_euler,
+    matrix_from_quaternion,
+    multiply3,
+    quaternion_from_matrix,
+    quaternion_from_vector,
+    quaternion_multiply,
+    quaternion_normalize,
+    rotate3,
+    rotate3_back,
+)
+from replay.kernels.update import fill_covariance, record_event, state_count
+
+_GRAVITY_M_S2 = 9.80665
+_MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
+
+
+@njit(cache=True)
+def _square(x):
+    return x * x
+
+
+@njit(cache=True)
+def _level(s, work):
+    """Roll, pitch and gyro bias from the sums at rest."""
+    total = s["rest_sum"]
+    count = s["rest_count"]
+    fx, fy, fz = total[3] / count, total[4] / count, total[5] / count
+    roll = atan2(-fy, -fz)
+    pitch = atan2(fx, sqrt(fy * fy + fz * fz))
+    matrix_from_euler(roll, pitch, 0.0, work["M"])
+    q = s["rest_q"]
+    quaternion_from_matrix(work["M"], q)
+    for i in range(4):
+        s["align_q"][i] = q[i]
+    for i in range(3):
+        s["bg"][i] = total[i] / count
+
+
+@njit(cache=True)
+def align_sample(s, cfg, work, dt, t, log_t, events, counts):
+    """Take one inertial sample (in `s["w_raw"]`, `s["f_raw"]`) while the attitude is unknown."""
+    w, f = s["w_raw"], s["f_raw"]
+    push_sample(s, w, f)
+    still = is_still(s, cfg, False)
+    if still:
+        total = s["rest_sum"]
+        for i in range(3):
+            total[i] += w[i]
+            total[3 + i] += f[i]
+        s["rest_count"] += 1
+        if s["rest_count"] * cfg["imu_interval"] >= cfg["rest_time"]:
+            _level(s, work)
+            if s["mode"] == WAITING:
+                s["mode"] = LEVELLED
+                record_event(events, counts, t, log_t, EVENT_LEVELLED, cfg["rest_time"], 0)
+    elif s["mode"] == WAITING:
+        s["rest_count"] = 0
+        for i in range(6):
+            s["rest_sum"][i] = 0.0
+    if s["mode"] == LEVELLED and not still:
+        bg = s["bg"]
+        q, scratch = s["align_q"], work["q"]
+        quaternion_from_vector(
+            (w[0] - bg[0]) * dt, (w[1] - bg[1]) * dt, (w[2] - bg[2]) * dt, scratch[0]
+        )
+        quaternion_multiply(q, scratch[0], scratch[1])
+        for i in range(4):
+            q[i] = scratch[1, i]
+        quaternion_normalize(q)
+
+
+@njit(cache=True)
+def align_fix(s, cfg, work, fix, log_t, events, counts):
+    """Take one fix while the heading is unknown; True where the filter begins to run."""
+    u = work["axes"]
+    enu_axes(fix["r"][0], fix["r"][1], fix["r"][2], u)
+    before_t = s["align_fix_t"]
+    before_speed = s["align_speed"]
+    between = (fix["t"] - before_t) * 1e-9
+    known = True
+    if fix["has_v"] == 1:
+        ve, vn, vu = rotate3(u, fix["v"][0], fix["v"][1], fix["v"][2])
+    elif before_t >= 0 and 0.0 < between <= 2.0:
+        p = s["align_fix_r"]
+        ve, vn, vu = rotate3(
+            u,
+            (fix["r"][0] - p[0]) / between,
+            (fix["r"][1] - p[1]) / between,
+            (fix["r"][2] - p[2]) / between,
+        )
+    else:
+        ve = vn = vu = 0.0
+        known = False
+    speed = sqrt(ve * ve + vn * vn)
+    s["align_fix_t"] = fix["t"]
+    for i in range(3):
+        s["align_fix_r"][i] = fix["r"][i]
+    s["align_speed"] = speed if known else -1.0
+    if not known or speed < cfg["course_speed"]:
+        return False
+    w, bg = s["w_raw"], s["bg"]
+    if s["mode"] == LEVELLED:
+        rate = sqrt(_square(w[0] - bg[0]) + _square(w[1] - bg[1]) + _square(w[2] - bg[2]))
+    else:
+        rate = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    if rate > cfg["course_turn_rate"]:
+        return False
+    course = atan2(ve, vn)
+    M = work["M"]
+    factor = 1.0
+    if s["mode"] == LEVELLED:
+        matrix_from_quaternion(s["align_q"], M)
+        roll, pitch, heading = euler_from_matrix(M)
+        turned = course - heading
+        # The mean rate at rest holds the Earth's rate: take it out with the attitude of then.
+        matrix_from_quaternion(s["rest_q"], M)
+        roll0, pitch0, heading0 = euler_from_matrix(M)
+        matrix_from_euler(roll0, pitch0, heading0 + turned, M)
+        north = EARTH_RATE_RAD_S * u[1, 2]
+        down = -EARTH_RATE_RAD_S * u[2, 2]
+        e0, e1, e2 = rotate3_back(M, north, 0.0, down)
+        bg[0] -= e0
+        bg[1] -= e1
+        bg[2] -= e2
+    else:
+        length = min(WINDOW, s["window_count"])
+        if length < 2 or before_t < 0 or before_speed < 0.0 or not 0.0 < between <= 2.0:
+            return False
+        length = min(length, max(2, int(between / cfg["imu_interval"] + 0.5)))
+        _, _, m2, f0, f1, f2, _, _ = window_statistics(s, length)
+        forward = (speed - before_speed) / between
+        ratio = (f0 - forward) / _GRAVITY_M_S2
+        pitch = asin(min(0.5, max(-0.5, ratio)))
+        roll = atan2(-(f1 - speed * m2), -f2)
+        factor = _MOVING_TILT_FACTOR
+    _start(s, cfg, work, fix, roll, pitch, course, ve, vn, vu, factor)
+    s["mode"] = RUNNING
+    record_event(events, counts, fix["t"], log_t, EVENT_ALIGNED, course, 0)
+    return True
+
+
+@njit(cache=True)
+def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
+    """Navigation state and covariance at a fix (velocity in east, north, up)."""
+    nav = s["nav"]
+    u, M, N = work["axes"], work["M"], work["N"]
+    matrix_from_euler(roll, pitch, heading, M)
+    # C_b_e from C_b_n: north, east, down are rows 1, 0 and minus 2 of the local axes.
+    for i in range(3):
+        N[i, 0] = u[1, i]
+        N[i, 1] = u[0, i]
+        N[i, 2] = -u[2, i]
+    C = nav["C"]
+    multiply3(N, M, C)
+    quaternion_from_matrix(C, nav["q"])
+    matrix_from_quaternion(nav["q"], C)
+    r, v = nav["r"], nav["v"]
+    lever = fix["lever"]
+    a0, a1, a2 = rotate3(C, lever[0], lever[1], lever[2])
+    w, bg = s["w_raw"], s["bg"]
+    c0, c1, c2 = cross3(w[0] - bg[0], w[1] - bg[1], w[2] - bg[2], lever[0], lever[1], lever[2])
+    b0, b1, b2 = rotate3(C, c0, c1, c2)
+    r[0] = fix["r"][0] - a0
+    r[1] = fix["r"][1] - a1
+    r[2] = fix["r"][2] - a2
+    v[0] = u[0, 0] * ve + u[1, 0] * vn + u[2, 0] * vu - b0
+    v[1] = u[0, 1] * ve + u[1, 1] * vn + u[2, 1] * vu - b1
+    v[2] = u[0, 2] * ve + u[1, 2] * vn + u[2, 2] * vu - b2
+    nav["dt"] = 0.0
+    s["t"] = fix["t"]
+    P = s["P"]
+    n = state_count(cfg)
+    for i in range(n):
+        for j in range(n):
+            P[i, j] = 0.0
+    R = work["R"]
+    fill_covariance(R, fix["R"], cfg["position_scale"], cfg["position_floor"])
+    _rotate_block(P, POSITION, u, R)
+    variance = cfg["velocity_initial"] * cfg["velocity_initial"]
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = 0.0
+        R[i, i] = variance
+    _rotate_block(P, VELOCITY, u, R)
+    tilt = cfg["tilt_initial"] * factor
+    R[0, 0] = tilt * tilt
+    R[1, 1] = tilt * tilt
+    R[2, 2] = cfg["heading_initial"] * cfg["heading_initial"]
+    _rotate_block(P, ATTITUDE, u, R)
+    for i in range(3):
+        P[GYRO_BIAS + i, GYRO_BIAS + i] = _square(cfg["gyro_bias_initial"]) * factor
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] = _square(cfg["accel_bias_initial"])
+        if cfg["states"] == 21:
+            P[15 + i, 15 + i] = _square(cfg["gyro_scale_sigma"])
+            P[18 + i, 18 + i] = _square(cfg["accel_scale_sigma"])
+    if cfg["mounting"] == 1:
+        for i in range(cfg["states"], n):
+            P[i, i] = _square(cfg["mounting_sigma"])
+
+
+@njit(cache=True)
+def _rotate_block(P, offset, u, R):
+    """Put u' R u (3, 3) on the diagonal of P at `offset`."""
+    for i in range(3):
+        for j in range(i, 3):
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += u[a, i] * R[a, b] * u[b, j]
+            P[offset + i, offset + j] = total
+            P[offset + j, offset + i] = total

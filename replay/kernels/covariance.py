@@ -1,0 +1,140 @@
+"""Time propagation of the error covariance of an inertial navigation system in ECEF.
+
+Error states, truth minus estimate, in this order: position (3, m), velocity (3, m/s),
+attitude psi (3, rad; ECEF axes, see :mod:`replay.kernels.rotation`), gyro bias
+(3, rad/s), accelerometer bias (3, m/s^2) and, with 21 states, gyro scale factor (3)
+and accelerometer scale factor (3). Further states may follow; they are constants
+or first-order Gauss-Markov processes here.
+
+Only the first nine rows of the transition matrix differ from a diagonal one
+(Groves 2e, eq. 14.48 and 14.49, psi-angle form of Lee (2010) eq. 9 to 11):
+
+    d(dr)/dt = dv
+    d(dv)/dt = -[f x] psi + G dr - 2 [w_ie x] dv - C (db_a + diag(f_b) ds_a)
+    d(psi)/dt = -[w_ie x] psi - C (db_g + diag(w_b) ds_g)
+"""
+
+from numba import njit
+
+from replay.kernels.earth import EARTH_RATE_RAD_S, GRAVITATIONAL_CONSTANT_M3_S2
+from replay.kernels.elementary import sqrt
+
+POSITION = 0
+VELOCITY = 3
+ATTITUDE = 6
+GYRO_BIAS = 9
+ACCEL_BIAS = 12
+GYRO_SCALE = 15
+ACCEL_SCALE = 18
+
+
+@njit(cache=True)
+def _apply(row, out, dt, G, C, A, W, f, scaled):
+    """One row of P times the transpose of the first nine rows of the transition matrix."""
+    w = EARTH_RATE_RAD_S * dt
+    w2 = 2.0 * w
+    r0, r1, r2 = row[0], row[1], row[2]
+    v0, v1, v2 = row[3], row[4], row[5]
+    p0, p1, p2 = row[6], row[7], row[8]
+    g0, g1, g2 = row[9], row[10], row[11]
+    a0, a1, a2 = row[12], row[13], row[14]
+    out[0] = r0 + dt * v0
+    out[1] = r1 + dt * v1
+    out[2] = r2 + dt * v2
+    y0 = v0 + (G[0, 0] * r0 + G[0, 1] * r1 + G[0, 2] * r2) + w2 * v1
+    y1 = v1 + (G[1, 0] * r0 + G[1, 1] * r1 + G[1, 2] * r2) - w2 * v0
+    y2 = v2 + (G[2, 0] * r0 + G[2, 1] * r1 + G[2, 2] * r2)
+    y0 -= f[1] * p2 - f[2] * p1
+    y1 -= f[2] * p0 - f[0] * p2
+    y2 -= f[0] * p1 - f[1] * p0
+    y0 -= C[0, 0] * a0 + C[0, 1] * a1 + C[0, 2] * a2
+    y1 -= C[1, 0] * a0 + C[1, 1] * a1 + C[1, 2] * a2
+    y2 -= C[2, 0] * a0 + C[2, 1] * a1 + C[2, 2] * a2
+    x0 = p0 + w * p1 - (C[0, 0] * g0 + C[0, 1] * g1 + C[0, 2] * g2)
+    x1 = p1 - w * p0 - (C[1, 0] * g0 + C[1, 1] * g1 + C[1, 2] * g2)
+    x2 = p2 - (C[2, 0] * g0 + C[2, 1] * g1 + C[2, 2] * g2)
+    if scaled:
+        s0, s1, s2 = row[15], row[16], row[17]
+        x0 -= W[0, 0] * s0 + W[0, 1] * s1 + W[0, 2] * s2
+        x1 -= W[1, 0] * s0 + W[1, 1] * s1 + W[1, 2] * s2
+        x2 -= W[2, 0] * s0 + W[2, 1] * s1 + W[2, 2] * s2
+        s0, s1, s2 = row[18], row[19], row[20]
+        y0 -= A[0, 0] * s0 + A[0, 1] * s1 + A[0, 2] * s2
+        y1 -= A[1, 0] * s0 + A[1, 1] * s1 + A[1, 2] * s2
+        y2 -= A[2, 0] * s0 + A[2, 1] * s1 + A[2, 2] * s2
+    out[3] = y0
+    out[4] = y1
+    out[5] = y2
+    out[6] = x0
+    out[7] = x1
+    out[8] = x2
+
+
+@njit(cache=True)
+def propagate(P, n, scaled, r, C, f_e, f_b, w_b, dt, decay, noise, work):
+    """P becomes Phi P Phi' + Q over one interval, exactly symmetric.
+
+    Parameters
+    ----------
+    P : float64 array (n, n)
+        Symmetric; changed in place.
+    n : int
+        Number of states.
+    scaled : bool
+        Whether states 15 to 20 are scale factors.
+    r : float64 array (3,), m, ECEF
+    C : float64 array (3, 3)
+        Body to ECEF.
+    f_e, f_b : float64 array (3,), m/s^2
+        Specific force in ECEF and in body axes.
+    w_b : float64 array (3,), rad/s
+        Angular rate, body axes.
+    dt : float, s
+    decay : float64 array (n,)
+        Diagonal of the transition matrix of states 9 and on.
+    noise : float64 array (n,)
+        Variance that each state gains over the interval.
+    work : float64 array (at least 25, at least max(n, 9))
+        Overwritten.
+    """
+    G = work[9:12]
+    Cd = work[12:15]
+    A = work[15:18]
+    W = work[18:21]
+    f = work[21]
+    out = work[22]
+    r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    k = GRAVITATIONAL_CONSTANT_M3_S2 / (r2 * sqrt(r2)) * dt
+    centrifugal = EARTH_RATE_RAD_S * EARTH_RATE_RAD_S * dt
+    for i in range(3):
+        for j in range(3):
+            G[i, j] = 3.0 * k * r[i] * r[j] / r2
+            Cd[i, j] = C[i, j] * dt
+            A[i, j] = C[i, j] * f_b[j] * dt
+            W[i, j] = C[i, j] * w_b[j] * dt
+        G[i, i] -= k
+        f[i] = f_e[i] * dt
+    G[0, 0] += centrifugal
+    G[1, 1] += centrifugal
+    # The nine busy rows of Phi P: P is symmetric, so column j comes from row j.
+    for j in range(n):
+        _apply(P[j], out, dt, G, Cd, A, W, f, scaled)
+        for i in range(9):
+            work[i, j] = out[i]
+    for i in range(9):
+        _apply(work[i], out, dt, G, Cd, A, W, f, scaled)
+        for j in range(i, 9):
+            P[i, j] = out[j]
+            P[j, i] = out[j]
+        P[i, i] += noise[i]
+    for j in range(9, n):
+        d = decay[j]
+        for i in range(9):
+            value = work[i, j] * d
+            P[i, j] = value
+            P[j, i] = value
+        for m in range(j, n):
+            value = P[j, m] * d * decay[m]
+            P[j, m] = value
+            P[m, j] = value
+        P[j, j] += noise[j]

@@ -1,0 +1,81 @@
+"""Position and velocity of a GNSS antenna as measurements of an inertial system (Groves 2e, 14.3).
+
+The antenna stands at a lever arm l from the IMU: r_a = r + C l and
+v_a = v + C (w_ib x l) - w_ie x (C l).
+"""
+
+from numba import njit
+
+from replay.kernels.covariance import ATTITUDE, GYRO_BIAS, GYRO_SCALE, POSITION, VELOCITY
+from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
+from replay.kernels.records import AXIS_EAST, KIND_POSITION, KIND_VELOCITY
+from replay.kernels.rotation import cross3, rotate3, rotate3_back
+from replay.kernels.update import fill_covariance, update
+
+
+@njit(cache=True)
+def position_update(s, cfg, work, fix, force, t, log_t, innovations, counts):
+    """Use the position of a fix; whether it was used."""
+    nav = s["nav"]
+    r, C, lever = nav["r"], nav["C"], fix["lever"]
+    H, index, z, u = work["H"], work["index"], work["z"], work["axes"]
+    fill_covariance(work["R"], fix["R"], cfg["position_scale"], cfg["position_floor"])
+    a0, a1, a2 = rotate3(C, lever[0], lever[1], lever[2])
+    d0 = fix["r"][0] - r[0] - a0
+    d1 = fix["r"][1] - r[1] - a1
+    d2 = fix["r"][2] - r[2] - a2
+    enu_axes(r[0], r[1], r[2], u)
+    for i in range(3):
+        index[i] = POSITION + i
+        index[3 + i] = ATTITUDE + i
+    for i in range(3):
+        z[i] = u[i, 0] * d0 + u[i, 1] * d1 + u[i, 2] * d2
+        H[i, 0] = u[i, 0]
+        H[i, 1] = u[i, 1]
+        H[i, 2] = u[i, 2]
+        H[i, 3], H[i, 4], H[i, 5] = cross3(a0, a1, a2, u[i, 0], u[i, 1], u[i, 2])
+    return update(
+        s, cfg, work, 3, 6, cfg["position_gate"], force, KIND_POSITION, AXIS_EAST, t, log_t,
+        innovations, counts,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts):
+    """Use the velocity of a fix; whether it was used."""
+    nav = s["nav"]
+    r, v, C, lever = nav["r"], nav["v"], nav["C"], fix["lever"]
+    w = work["w"]
+    H, index, z, u = work["H"], work["index"], work["z"], work["axes"]
+    fill_covariance(work["R"], fix["V"], cfg["velocity_scale"], cfg["velocity_floor"])
+    wl0, wl1, wl2 = cross3(w[0], w[1], w[2], lever[0], lever[1], lever[2])
+    b0, b1, b2 = rotate3(C, wl0, wl1, wl2)
+    a0, a1, _ = rotate3(C, lever[0], lever[1], lever[2])
+    d0 = fix["v"][0] - v[0] - b0 - EARTH_RATE_RAD_S * a1
+    d1 = fix["v"][1] - v[1] - b1 + EARTH_RATE_RAD_S * a0
+    d2 = fix["v"][2] - v[2] - b2
+    enu_axes(r[0], r[1], r[2], u)
+    scaled = cfg["states"] == 21
+    for i in range(3):
+        index[i] = VELOCITY + i
+        index[3 + i] = ATTITUDE + i
+        index[6 + i] = GYRO_BIAS + i
+        index[9 + i] = GYRO_SCALE + i
+    for i in range(3):
+        z[i] = u[i, 0] * d0 + u[i, 1] * d1 + u[i, 2] * d2
+        H[i, 0] = u[i, 0]
+        H[i, 1] = u[i, 1]
+        H[i, 2] = u[i, 2]
+        H[i, 3], H[i, 4], H[i, 5] = cross3(b0, b1, b2, u[i, 0], u[i, 1], u[i, 2])
+        ub0, ub1, ub2 = rotate3_back(C, u[i, 0], u[i, 1], u[i, 2])
+        g0, g1, g2 = cross3(ub0, ub1, ub2, lever[0], lever[1], lever[2])
+        H[i, 6] = g0
+        H[i, 7] = g1
+        H[i, 8] = g2
+        H[i, 9] = g0 * w[0]
+        H[i, 10] = g1 * w[1]
+        H[i, 11] = g2 * w[2]
+    return update(
+        s, cfg, work, 3, 12 if scaled else 9, cfg["velocity_gate"], force, KIND_VELOCITY, AXIS_EAST,
+        t, log_t, innovations, counts,
+    )  # fmt: skip

@@ -1,0 +1,180 @@
+"""A vector measurement of up to three components: gate, record, update, feed back."""
+
+from numba import njit
+
+from replay.kernels.covariance import (
+    ACCEL_BIAS,
+    ACCEL_SCALE,
+    ATTITUDE,
+    GYRO_BIAS,
+    GYRO_SCALE,
+    POSITION,
+    VELOCITY,
+)
+from replay.kernels.elementary import sqrt
+from replay.kernels.kalman import (
+    cholesky3,
+    forward_square3,
+    innovation_covariance,
+    whitened_update,
+)
+from replay.kernels.rotation import (
+    matrix_from_quaternion,
+    quaternion_from_vector,
+    quaternion_multiply,
+    quaternion_normalize,
+)
+
+
+@njit(cache=True)
+def state_count(cfg):
+    """Number of error states of a configuration."""
+    return cfg["states"] + 2 * cfg["mounting"]
+
+
+@njit(cache=True)
+def feed_back(s, cfg, dx, scratch):
+    """Add a correction (truth minus estimate) to the filter's state."""
+    nav = s["nav"]
+    r, v, q = nav["r"], nav["v"], nav["q"]
+    bg, ba = s["bg"], s["ba"]
+    for i in range(3):
+        r[i] += dx[POSITION + i]
+        v[i] += dx[VELOCITY + i]
+        bg[i] += dx[GYRO_BIAS + i]
+        ba[i] += dx[ACCEL_BIAS + i]
+    if cfg["states"] == 21:
+        sg, sa = s["sg"], s["sa"]
+        for i in range(3):
+            sg[i] += dx[GYRO_SCALE + i]
+            sa[i] += dx[ACCEL_SCALE + i]
+    if cfg["mounting"] == 1:
+        mount = s["mount"]
+        mount[0] += dx[cfg["states"]]
+        mount[1] += dx[cfg["states"] + 1]
+    quaternion_from_vector(dx[ATTITUDE], dx[ATTITUDE + 1], dx[ATTITUDE + 2], scratch[0])
+    quaternion_multiply(scratch[0], q, scratch[1])
+    for i in range(4):
+        q[i] = scratch[1, i]
+    quaternion_normalize(q)
+    matrix_from_quaternion(q, nav["C"])
+
+
+@njit(cache=True)
+def record_innovation(rows, counts, t, log_t, kind, axis, z, s, r, accepted):
+    """Append one row to the innovations."""
+    row = rows[counts[2]]
+    row["t"] = t
+    row["log_t"] = log_t
+    row["kind"] = kind
+    row["axis"] = axis
+    row["z"] = z
+    row["s"] = s
+    row["r"] = r
+    row["accepted"] = accepted
+    counts[2] += 1
+
+
+@njit(cache=True)
+def record_event(rows, counts, t, log_t, kind, value, note):
+    """Append one row to the events; beyond the room that there is, only count it."""
+    if counts[3] < rows.shape[0]:
+        row = rows[counts[3]]
+        row["t"] = t
+        row["log_t"] = log_t
+        row["kind"] = kind
+        row["value"] = value
+        row["note"] = note
+        counts[3] += 1
+    else:
+        counts[4] += 1
+
+
+@njit(cache=True)
+def update(s, cfg, work, k, count, gate, force, kind, axis, t, log_t, innovations, counts):
+    """Use the measurement that stands in `work`: H, index, z, R.
+
+    Parameters
+    ----------
+    s : record of STATE_DTYPE
+        Changed in place.
+    cfg : record of CONFIG_DTYPE
+    work : record of WORK_DTYPE
+    k : int
+        Components.
+    count : int
+        States that `work["index"]` names.
+    gate : float
+        Limit of the joint chi-square; zero or less lets everything in.
+    force : bool
+        Use it whatever the gate says.
+    kind, axis : int
+        What to record; axes count up from `axis`.
+    t, log_t : int, ns
+    innovations, counts
+        Where to record.
+
+    Returns
+    -------
+    bool
+        Whether it was used.
+    """
+    P = s["P"]
+    H, index, z, R = work["H"], work["index"], work["z"], work["R"]
+    S, L = work["S"], work["L"]
+    n = state_count(cfg)
+    innovation_covariance(P, n, H, index, count, R, k, work["PH"], S)
+    accepted = cholesky3(S, k, L)
+    if accepted and gate > 0.0 and not force:
+        accepted = forward_square3(L, z, k) <= gate
+    for a in range(k):
+        record_innovation(
+            innovations,
+            counts,
+            t,
+            log_t,
+            kind,
+            axis + a,
+            z[a],
+            sqrt(S[a, a]),
+            sqrt(R[a, a]),
+            accepted,
+        )
+    if not accepted:
+        return False
+    dx = work["dx"]
+    for i in range(n):
+        dx[i] = 0.0
+    if not whitened_update(
+        P, n, H, index, count, z, R, k, dx, L, work["h"], work["b"], work["gain"]
+    ):
+        return False
+    feed_back(s, cfg, dx, work["q"])
+    return True
+
+
+@njit(cache=True)
+def fill_covariance(R, c, scale, floor):
+    """(3, 3) from an upper triangle, scaled, with floor^2 added to the diagonal."""
+    k = scale * scale
+    f = floor * floor
+    R[0, 0] = k * c[0] + f
+    R[0, 1] = k * c[1]
+    R[0, 2] = k * c[2]
+    R[1, 1] = k * c[3] + f
+    R[1, 2] = k * c[4]
+    R[2, 2] = k * c[5] + f
+    R[1, 0] = R[0, 1]
+    R[2, 0] = R[0, 2]
+    R[2, 1] = R[1, 2]
+
+
+@njit(cache=True)
+def diagonal(R, a, b, c):
+    """(3, 3) diagonal matrix of three variances."""
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = 0.0
+    R[0, 0] = a
+    R[1, 1] = b
+    R[2, 2] = c
