@@ -1,0 +1,19 @@
+"""Names of error states, in the order of the covariance's rows."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_AXES: Final = ("x", "y", "z")
+_CORE: Final = ("position_ecef", "velocity_ecef", "attitude_ecef", "gyro_bias", "accel_bias")
+_SCALES: Final = ("gyro_scale", "accel_scale")
+
+
+def state_names(states: int, *, mounting: bool) -> tuple[str, ...]:
+    """Names of the 15 or 21 inertial error states, and of the two mounting angles.
+
+    Order and meaning are those of :mod:`replay.kernels.covariance`.
+    """
+    groups = _CORE + (_SCALES if states == 21 else ())
+    names = tuple(f"{group}_{axis}" for group in groups for axis in _AXES)
+    return names + (("mounting_pitch", "mounting_yaw") if mounting else ())

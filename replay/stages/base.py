@@ -1,0 +1,118 @@
+"""What a stage is: a function from channels to channels that carries a state.
+
+A stage is given blocks: rows of its inputs up to some time, in the order of the
+log. Where the log is cut into blocks must not change a bit of what it writes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from replay.channels import ChannelSpec
+from replay.configuration import Section
+from replay.log.columns import Columns
+
+StateT = TypeVar("StateT")
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class StageSpec:
+    """What the engine knows of a stage.
+
+    Attributes
+    ----------
+    name : str
+    version : int
+        Raised with every change that alters an output.
+    inputs : tuple of ChannelSpec
+        The log must have each of them.
+    outputs : tuple of ChannelSpec
+    trigger : ChannelSpec
+        The input whose rows end a step; the trace has one row per step.
+    """
+
+    name: str
+    version: int
+    inputs: tuple[ChannelSpec, ...]
+    outputs: tuple[ChannelSpec, ...]
+    trigger: ChannelSpec
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Context:
+    """What a stage may know before its first block.
+
+    Attributes
+    ----------
+    topics : mapping of ChannelSpec.name to topic
+        Inputs and outputs.
+    heads : mapping of ChannelSpec.name to Columns
+        The first rows of each input, however the log is cut: for nominal intervals.
+    """
+
+    topics: Mapping[str, str]
+    heads: Mapping[str, Columns]
+
+
+Block = Mapping[str, Columns]
+"""Rows by ChannelSpec.name. A channel without rows in the block is not in it."""
+
+Outputs = dict[str, Columns]
+"""Rows by ChannelSpec.name, whose log times lie within the block or at its end."""
+
+
+class Stage(Protocol[StateT]):
+    """One stage of a pipeline."""
+
+    spec: StageSpec
+
+    def start(self, config: Section, context: Context) -> StateT:
+        """State before the first row."""
+
+    def step(self, state: StateT, block: Block) -> tuple[StateT, Outputs]:
+        """Take a block."""
+
+    def finish(self, state: StateT) -> Outputs:
+        """What is left to say after the last block."""
+
+    def dump(self, state: StateT) -> bytes:
+        """The state as bytes, the same for equal states."""
+
+    def restore(self, state: StateT, data: bytes) -> StateT:
+        """The state of a dump; `state` is that of `start` with the same configuration."""
+
+
+def dump_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Arrays as bytes: name, type, shape and content, in the order given."""
+    parts: list[bytes] = []
+    for name, array in arrays.items():
+        content = np.ascontiguousarray(array).tobytes()
+        head = f"{name} {','.join(map(str, array.shape))} {len(content)}\n".encode()
+        parts.extend([head, content])
+    return b"".join(parts)
+
+
+def restore_arrays(data: bytes, types: Mapping[str, np.dtype]) -> dict[str, np.ndarray]:
+    """Arrays of :func:`dump_arrays`, given the type of each.
+
+    Raises
+    ------
+    ValueError
+        Where the bytes are not those of such arrays.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    position = 0
+    for name, dtype in types.items():
+        end = data.index(b"\n", position)
+        found, shape, length = data[position:end].decode().split(" ")
+        if found != name:
+            raise ValueError(f"a dump holds {found}, not {name}")
+        stop = end + 1 + int(length)
+        dimensions = tuple(int(n) for n in shape.split(",") if n)
+        arrays[name] = np.frombuffer(data[end + 1 : stop], dtype=dtype).reshape(dimensions).copy()
+        position = stop
+    return arrays
