@@ -157,6 +157,7 @@ FILTER_STATE: Final = ChannelSpec(
         "gyro_scale_factor": Tolerance(1e-7, "1"),
         "accel_scale_factor": Tolerance(1e-7, "1"),
         "mounting_angles_rad": _RAD,
+        "non_slip_point_body_m": _M,
     },
 )
 FILTER_COVARIANCE: Final = ChannelSpec(

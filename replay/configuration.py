@@ -170,12 +170,14 @@ def _prepare_value(hint: Any, value: Any, name: str, path: tuple[str, ...]) -> A
             raise ConfigurationError(f"{name} is a table", mend=f"write {name}.KEY=VALUE")
         return _prepare(hint, value, path)
     unit = field_unit(hint)
-    if unit is not None:
-        if isinstance(value, str):
-            return to_si(value, unit, name)
-        if isinstance(value, list):
-            return [to_si(v, unit, name) if isinstance(v, str) else v for v in value]
-    return value
+    if unit is None:
+        return value
+    many = get_origin(hint) is tuple
+    items = list(value) if isinstance(value, list | tuple) else [value]
+    numbers = [to_si(item, unit, name) if isinstance(item, str) else item for item in items]
+    if not many:
+        return numbers[0] if len(items) == 1 else numbers
+    return numbers
 
 
 def field_unit(hint: Any) -> str | None:

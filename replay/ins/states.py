@@ -9,11 +9,15 @@ _CORE: Final = ("position_ecef", "velocity_ecef", "attitude_ecef", "gyro_bias", 
 _SCALES: Final = ("gyro_scale", "accel_scale")
 
 
-def state_names(states: int, *, mounting: bool) -> tuple[str, ...]:
-    """Names of the 15 or 21 inertial error states, and of the two mounting angles.
+def state_names(states: int, *, mounting: bool, lever: bool) -> tuple[str, ...]:
+    """Names of the 15 or 21 inertial error states, and of those of the vehicle.
 
     Order and meaning are those of :mod:`replay.kernels.covariance`.
     """
     groups = _CORE + (_SCALES if states == 21 else ())
     names = tuple(f"{group}_{axis}" for group in groups for axis in _AXES)
-    return names + (("mounting_pitch", "mounting_yaw") if mounting else ())
+    if mounting:
+        names += ("mounting_pitch", "mounting_yaw")
+    if lever:
+        names += ("non_slip_point_forward", "non_slip_point_down")
+    return names

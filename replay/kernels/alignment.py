@@ -8,17 +8,25 @@ log that begins in motion is levelled with the acceleration that GNSS sees.
 
 from numba import njit
 
-from replay.kernels.constraints import is_still, push_sample, window_statistics
-from replay.kernels.covariance import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
+from replay.kernels.constraints import is_still, push_sample, samples_in, window_mean
+from replay.kernels.covariance import (
+    ACCEL_BIAS,
+    ACCEL_SCALE,
+    ATTITUDE,
+    GYRO_BIAS,
+    GYRO_SCALE,
+    POSITION,
+    VELOCITY,
+)
 from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
 from replay.kernels.elementary import asin, atan2, sqrt
+from replay.kernels.kalman import whitened_update
 from replay.kernels.records import (
     EVENT_ALIGNED,
     EVENT_LEVELLED,
     LEVELLED,
     RUNNING,
     WAITING,
-    WINDOW,
 )
 from replay.kernels.rotation import (
     cross3,
@@ -33,9 +41,10 @@ from replay.kernels.rotation import (
     rotate3,
     rotate3_back,
 )
-from replay.kernels.update import fill_covariance, record_event, state_count
+from replay.kernels.update import diagonal, fill_covariance, record_event, state_count
 
 _GRAVITY_M_S2 = 9.80665
+_TURN_WINDOW_S = 0.2  # long enough to average an engine's shaking
 _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
 
@@ -59,6 +68,7 @@ def _level(s, work):
         s["align_q"][i] = q[i]
     for i in range(3):
         s["bg"][i] = total[i] / count
+        s["rest_f"][i] = total[3 + i] / count
 
 
 @njit(cache=True)
@@ -66,7 +76,7 @@ def align_sample(s, cfg, work, dt, t, log_t, events, counts):
     """Take one inertial sample (in `s["w_raw"]`, `s["f_raw"]`) while the attitude is unknown."""
     w, f = s["w_raw"], s["f_raw"]
     push_sample(s, w, f)
-    still = is_still(s, cfg, False)
+    still = is_still(s, cfg, work, False)
     if still:
         total = s["rest_sum"]
         for i in range(3):
@@ -123,16 +133,16 @@ def align_fix(s, cfg, work, fix, log_t, events, counts):
     s["align_speed"] = speed if known else -1.0
     if not known or speed < cfg["course_speed"]:
         return False
-    w, bg = s["w_raw"], s["bg"]
-    if s["mode"] == LEVELLED:
-        rate = sqrt(_square(w[0] - bg[0]) + _square(w[1] - bg[1]) + _square(w[2] - bg[2]))
-    else:
-        rate = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    if rate > cfg["course_turn_rate"]:
+    bg, mean = s["bg"], work["mean"]
+    if s["window_count"] == 0:
+        return False
+    window_mean(s, 0, min(s["window_count"], samples_in(_TURN_WINDOW_S, cfg)), mean)
+    if abs(mean[2] - bg[2]) > cfg["course_turn_rate"]:
         return False
     course = atan2(ve, vn)
     M = work["M"]
     factor = 1.0
+    roll0 = pitch0 = heading0 = turned = 0.0
     if s["mode"] == LEVELLED:
         matrix_from_quaternion(s["align_q"], M)
         roll, pitch, heading = euler_from_matrix(M)
@@ -148,20 +158,34 @@ def align_fix(s, cfg, work, fix, log_t, events, counts):
         bg[1] -= e1
         bg[2] -= e2
     else:
-        length = min(WINDOW, s["window_count"])
-        if length < 2 or before_t < 0 or before_speed < 0.0 or not 0.0 < between <= 2.0:
+        if before_t < 0 or before_speed < 0.0 or not 0.0 < between <= 2.0:
             return False
-        length = min(length, max(2, int(between / cfg["imu_interval"] + 0.5)))
-        _, _, m2, f0, f1, f2, _, _ = window_statistics(s, length)
+        length = min(s["window_count"], samples_in(between, cfg))
+        window_mean(s, 0, length, mean)
         forward = (speed - before_speed) / between
-        ratio = (f0 - forward) / _GRAVITY_M_S2
+        ratio = (mean[3] - forward) / _GRAVITY_M_S2
         pitch = asin(min(0.5, max(-0.5, ratio)))
-        roll = atan2(-(f1 - speed * m2), -f2)
+        roll = atan2(-(mean[4] - speed * mean[2]), -mean[5])
         factor = _MOVING_TILT_FACTOR
     _start(s, cfg, work, fix, roll, pitch, course, ve, vn, vu, factor)
+    if s["mode"] == LEVELLED and cfg["rest_sigma"] > 0.0:
+        M, N, u = work["M"], work["N"], work["axes"]
+        matrix_from_euler(roll0, pitch0, heading0 + turned, N)
+        _north_east_down(u, work["S"])
+        multiply3(work["S"], N, M)
+        _tie_tilt_to_bias(s, cfg, work)
     s["mode"] = RUNNING
     record_event(events, counts, fix["t"], log_t, EVENT_ALIGNED, course, 0)
     return True
+
+
+@njit(cache=True)
+def _north_east_down(u, out):
+    """C_n_e into `out` from the rows of east, north and up."""
+    for i in range(3):
+        out[i, 0] = u[1, i]
+        out[i, 1] = u[0, i]
+        out[i, 2] = -u[2, i]
 
 
 @njit(cache=True)
@@ -170,11 +194,7 @@ def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
     nav = s["nav"]
     u, M, N = work["axes"], work["M"], work["N"]
     matrix_from_euler(roll, pitch, heading, M)
-    # C_b_e from C_b_n: north, east, down are rows 1, 0 and minus 2 of the local axes.
-    for i in range(3):
-        N[i, 0] = u[1, i]
-        N[i, 1] = u[0, i]
-        N[i, 2] = -u[2, i]
+    _north_east_down(u, N)
     C = nav["C"]
     multiply3(N, M, C)
     quaternion_from_matrix(C, nav["q"])
@@ -213,14 +233,51 @@ def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
     R[2, 2] = cfg["heading_initial"] * cfg["heading_initial"]
     _rotate_block(P, ATTITUDE, u, R)
     for i in range(3):
-        P[GYRO_BIAS + i, GYRO_BIAS + i] = _square(cfg["gyro_bias_initial"]) * factor
-        P[ACCEL_BIAS + i, ACCEL_BIAS + i] = _square(cfg["accel_bias_initial"])
+        P[GYRO_BIAS + i, GYRO_BIAS + i] = _square(cfg["gyro_bias_initial"][i]) * factor
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] = _square(cfg["accel_bias_initial"][i])
         if cfg["states"] == 21:
-            P[15 + i, 15 + i] = _square(cfg["gyro_scale_sigma"])
-            P[18 + i, 18 + i] = _square(cfg["accel_scale_sigma"])
+            P[GYRO_SCALE + i, GYRO_SCALE + i] = _square(cfg["gyro_scale_sigma"][i])
+            P[ACCEL_SCALE + i, ACCEL_SCALE + i] = _square(cfg["accel_scale_sigma"][i])
+        s["point"][i] = cfg["nhc_lever"][i]
+    k = cfg["states"]
     if cfg["mounting"] == 1:
-        for i in range(cfg["states"], n):
-            P[i, i] = _square(cfg["mounting_sigma"])
+        P[k, k] = _square(cfg["mounting_sigma"])
+        P[k + 1, k + 1] = P[k, k]
+        k += 2
+    if cfg["lever"] == 1:
+        P[k, k] = _square(cfg["lever_sigma"][0])
+        P[k + 1, k + 1] = _square(cfg["lever_sigma"][1])
+
+
+@njit(cache=True)
+def _tie_tilt_to_bias(s, cfg, work):
+    """What levelling at rest leaves: tilt and accelerometer bias are wrong together.
+
+    The specific force of then, turned with the attitude of then, stands against
+    gravity: its horizontal part is nought. The heading found since turns both alike.
+    """
+    C, u, f = work["M"], work["axes"], s["rest_f"]
+    H, index, z = work["H"], work["index"], work["z"]
+    f0, f1, f2 = rotate3(C, f[0], f[1], f[2])
+    variance = _square(cfg["rest_sigma"])
+    diagonal(work["R"], variance, variance, 1.0)
+    for i in range(3):
+        index[i] = ATTITUDE + i
+        index[3 + i] = ACCEL_BIAS + i
+    for i in range(2):
+        z[i] = 0.0
+        H[i, 0], H[i, 1], H[i, 2] = cross3(f0, f1, f2, u[i, 0], u[i, 1], u[i, 2])
+        b0, b1, b2 = rotate3_back(C, u[i, 0], u[i, 1], u[i, 2])
+        H[i, 3] = -b0
+        H[i, 4] = -b1
+        H[i, 5] = -b2
+    n = state_count(cfg)
+    dx = work["dx"]
+    for i in range(n):
+        dx[i] = 0.0
+    whitened_update(
+        s["P"], n, H, index, 6, z, work["R"], 2, dx, work["L"], work["h"], work["b"], work["gain"]
+    )
 
 
 @njit(cache=True)

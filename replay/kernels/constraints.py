@@ -1,7 +1,7 @@
 """What a vehicle does not do: move when it stands, slip sideways when it drives.
 
-The stop detector looks at a window of inertial samples alone and asks for the
-filter's consent only to rule out a smooth constant speed.
+The stop detector looks at a window of inertial samples; the filter's own speed is
+asked only to rule out a smooth constant speed.
 """
 
 from numba import njit
@@ -35,61 +35,48 @@ def push_sample(s, w, f):
 
 
 @njit(cache=True)
-def window_statistics(s, length):
-    """Mean (6) and spread of the last `length` samples.
-
-    Returns
-    -------
-    tuple
-        Six means (rad/s, m/s^2), root sum square of the three gyro deviations
-        (rad/s) and standard deviation of the length of the specific force (m/s^2).
-    """
-    window = s["window"]
-    m0 = m1 = m2 = m3 = m4 = m5 = mf = 0.0
-    start = s["window_head"] - length + WINDOW
-    for k in range(length):
-        row = window[(start + k) % WINDOW]
-        m0 += row[0]
-        m1 += row[1]
-        m2 += row[2]
-        m3 += row[3]
-        m4 += row[4]
-        m5 += row[5]
-        mf += sqrt(row[3] * row[3] + row[4] * row[4] + row[5] * row[5])
-    m0 /= length
-    m1 /= length
-    m2 /= length
-    m3 /= length
-    m4 /= length
-    m5 /= length
-    mf /= length
-    vg = vf = 0.0
-    for k in range(length):
-        row = window[(start + k) % WINDOW]
-        a = row[0] - m0
-        b = row[1] - m1
-        c = row[2] - m2
-        vg += a * a + b * b + c * c
-        d = sqrt(row[3] * row[3] + row[4] * row[4] + row[5] * row[5]) - mf
-        vf += d * d
-    return m0, m1, m2, m3, m4, m5, sqrt(vg / length), sqrt(vf / length)
+def samples_in(seconds, cfg):
+    """Number of samples in a stretch of time, at least one and at most the window."""
+    return min(WINDOW, max(1, int(seconds / cfg["imu_interval"] + 0.5)))
 
 
 @njit(cache=True)
-def is_still(s, cfg, bias_known):
-    """Whether the window of the stop detector shows rest."""
-    length = min(WINDOW, max(2, int(cfg["stop_window"] / cfg["imu_interval"] + 0.5)))
-    if s["window_count"] < length:
+def window_mean(s, skip, length, mean):
+    """Mean (6: rad/s, m/s^2) of `length` samples that end `skip` samples ago into `mean`."""
+    window = s["window"]
+    start = s["window_head"] - skip - length + 2 * WINDOW
+    for i in range(6):
+        mean[i] = 0.0
+    for k in range(length):
+        row = window[(start + k) % WINDOW]
+        for i in range(6):
+            mean[i] += row[i]
+    for i in range(6):
+        mean[i] /= length
+
+
+@njit(cache=True)
+def is_still(s, cfg, work, bias_known):
+    """Whether the window of the stop detector shows rest.
+
+    Samples are averaged in short blocks first: an idling engine shakes a sensor by
+    more than a slow start does, but not over a few of its turns.
+    """
+    block = cfg["stop_block"]
+    blocks = samples_in(cfg["stop_window"], cfg) // block
+    if blocks < 2 or s["window_count"] < blocks * block:
         return False
-    m0, m1, m2, _, _, _, gyro, accel = window_statistics(s, length)
-    if gyro > cfg["stop_gyro"] or accel > cfg["stop_accel"]:
+    mean, part = work["mean"], work["part"]
+    window_mean(s, 0, blocks * block, mean)
+    if bias_known and abs(mean[2] - s["bg"][2]) > cfg["stop_rate"]:
         return False
-    if bias_known:
-        bg = s["bg"]
-        m0 -= bg[0]
-        m1 -= bg[1]
-        m2 -= bg[2]
-        return sqrt(m0 * m0 + m1 * m1 + m2 * m2) <= cfg["stop_rate"]
+    for k in range(blocks):
+        window_mean(s, k * block, block, part)
+        if abs(part[2] - mean[2]) > cfg["stop_gyro"]:
+            return False
+        for i in range(3, 6):
+            if abs(part[i] - mean[i]) > cfg["stop_accel"]:
+                return False
     return True
 
 
@@ -129,20 +116,21 @@ def zero_rate_update(s, cfg, work, t, log_t, innovations, counts):
     nav = s["nav"]
     C, bg = nav["C"], s["bg"]
     H, index, z = work["H"], work["index"], work["z"]
-    length = min(WINDOW, max(2, int(cfg["stop_interval"] / cfg["imu_interval"] + 0.5)))
+    length = samples_in(cfg["stop_interval"], cfg)
     if s["window_count"] < length:
         return False
-    m0, m1, m2, _, _, _, _, _ = window_statistics(s, length)
-    variance = cfg["zero_rate_sigma"] * cfg["zero_rate_sigma"]
-    diagonal(work["R"], variance, variance, variance)
+    mean = work["mean"]
+    window_mean(s, 0, length, mean)
+    sigma = cfg["zero_rate_sigma"]
+    diagonal(work["R"], sigma[0] * sigma[0], sigma[1] * sigma[1], sigma[2] * sigma[2])
     e0, e1, e2 = rotate3_back(C, 0.0, 0.0, EARTH_RATE_RAD_S)
     for i in range(3):
         index[i] = GYRO_BIAS + i
         for j in range(3):
             H[i, j] = 1.0 if i == j else 0.0
-    z[0] = m0 - bg[0] - e0
-    z[1] = m1 - bg[1] - e1
-    z[2] = m2 - bg[2] - e2
+    z[0] = mean[0] - bg[0] - e0
+    z[1] = mean[1] - bg[1] - e1
+    z[2] = mean[2] - bg[2] - e2
     return update(
         s, cfg, work, 3, 3, 0.0, True, KIND_ZERO_RATE, AXIS_FORWARD, t, log_t, innovations, counts
     )
@@ -154,13 +142,14 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
 
     With mounting pitch p and yaw y, small angles from vehicle to body axes, the
     vehicle's velocity at the point is v_right = v_y - y v_x and v_down = v_z + p v_x,
-    where v_b = C' v + (w_ib - w_ie) x l.
+    where v_b = C' v + (w_ib - w_ie) x l. Forward and down coordinates of the point can
+    be states too; it need not be the rear axle (tyres slip, suspensions lean).
     """
     nav = s["nav"]
     v, C = nav["v"], nav["C"]
-    lever = cfg["nhc_lever"]
+    lever = s["point"]
     mount = s["mount"]
-    w = work["w"]
+    w = s["w_smooth"]
     H, index, z, u = work["H"], work["index"], work["z"], work["axes"]
     e0, e1, e2 = rotate3_back(C, 0.0, 0.0, EARTH_RATE_RAD_S)
     w0, w1, w2 = w[0] - e0, w[1] - e1, w[2] - e2
@@ -187,9 +176,8 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
         for i in range(3):
             index[count + i] = GYRO_SCALE + i
         count += 3
-    if cfg["mounting"] == 1:
-        index[count] = cfg["states"]
-        index[count + 1] = cfg["states"] + 1
+    for i in range(2 * cfg["mounting"] + 2 * cfg["lever"]):
+        index[count + i] = cfg["states"] + i
     for i in range(2):
         x0 = -yaw if i == 0 else pitch
         x1 = 1.0 if i == 0 else 0.0
@@ -210,10 +198,18 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
             H[i, 9] = g0 * w[0]
             H[i, 10] = g1 * w[1]
             H[i, 11] = g2 * w[2]
+        column = count
         if cfg["mounting"] == 1:
-            H[i, count] = b0 if i == 1 else 0.0
-            H[i, count + 1] = -b0 if i == 0 else 0.0
+            H[i, column] = b0 if i == 1 else 0.0
+            H[i, column + 1] = -b0 if i == 0 else 0.0
+            column += 2
+        if cfg["lever"] == 1:
+            # Columns of [w x] that belong to the forward and the down coordinate.
+            H[i, column] = x1 * w2 - x2 * w1
+            H[i, column + 1] = x0 * w1 - x1 * w0
     if cfg["mounting"] == 1:
+        count += 2
+    if cfg["lever"] == 1:
         count += 2
     return update(
         s, cfg, work, 2, count, cfg["nhc_gate"], False, KIND_NON_HOLONOMIC, AXIS_RIGHT, t, log_t,

@@ -71,6 +71,19 @@ def _apply(row, out, dt, G, C, A, W, f, scaled):
 
 
 @njit(cache=True)
+def _add_body_noise(P, first, C, noise):
+    """Add C diag(noise) C' to the (3, 3) block at `first`."""
+    a, b, c = noise[first], noise[first + 1], noise[first + 2]
+    for i in range(3):
+        for j in range(i, 3):
+            value = P[first + i, first + j] + (
+                C[i, 0] * a * C[j, 0] + C[i, 1] * b * C[j, 1] + C[i, 2] * c * C[j, 2]
+            )
+            P[first + i, first + j] = value
+            P[first + j, first + i] = value
+
+
+@njit(cache=True)
 def propagate(P, n, scaled, r, C, f_e, f_b, w_b, dt, decay, noise, work):
     """P becomes Phi P Phi' + Q over one interval, exactly symmetric.
 
@@ -93,7 +106,8 @@ def propagate(P, n, scaled, r, C, f_e, f_b, w_b, dt, decay, noise, work):
     decay : float64 array (n,)
         Diagonal of the transition matrix of states 9 and on.
     noise : float64 array (n,)
-        Variance that each state gains over the interval.
+        Variance that each state gains over the interval; that of velocity and
+        attitude along body axes.
     work : float64 array (at least 25, at least max(n, 9))
         Overwritten.
     """
@@ -126,7 +140,9 @@ def propagate(P, n, scaled, r, C, f_e, f_b, w_b, dt, decay, noise, work):
         for j in range(i, 9):
             P[i, j] = out[j]
             P[j, i] = out[j]
-        P[i, i] += noise[i]
+        P[i, i] += noise[i] if i < VELOCITY else 0.0
+    _add_body_noise(P, VELOCITY, C, noise)
+    _add_body_noise(P, ATTITUDE, C, noise)
     for j in range(9, n):
         d = decay[j]
         for i in range(9):

@@ -18,7 +18,7 @@ from replay.kernels.constraints import (
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY, propagate
 from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
 from replay.kernels.elementary import exp, sqrt
-from replay.kernels.gnss_update import position_update, velocity_update
+from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
 from replay.kernels.records import (
     EVENT_IMU_GAP,
     EVENT_NOT_FINITE,
@@ -51,8 +51,8 @@ def _decay_and_noise(cfg, work, dt):
     decay, noise = work["decay"], work["noise"]
     for i in range(3):
         noise[POSITION + i] = 0.0
-        noise[VELOCITY + i] = cfg["accel_noise"] * cfg["accel_noise"] * dt
-        noise[ATTITUDE + i] = cfg["gyro_noise"] * cfg["gyro_noise"] * dt
+        noise[VELOCITY + i] = cfg["accel_noise"][i] * cfg["accel_noise"][i] * dt
+        noise[ATTITUDE + i] = cfg["gyro_noise"][i] * cfg["gyro_noise"][i] * dt
     _gauss_markov(decay, noise, 9, cfg["gyro_bias_sigma"], cfg["gyro_bias_tau"], dt)
     _gauss_markov(decay, noise, 12, cfg["accel_bias_sigma"], cfg["accel_bias_tau"], dt)
     if cfg["states"] == 21:
@@ -62,6 +62,11 @@ def _decay_and_noise(cfg, work, dt):
         for i in range(cfg["states"], cfg["states"] + 2):
             decay[i] = 1.0
             noise[i] = cfg["mounting_noise"] * cfg["mounting_noise"] * dt
+    if cfg["lever"] == 1:
+        n = state_count(cfg)
+        for i in range(n - 2, n):
+            decay[i] = 1.0
+            noise[i] = 0.0
 
 
 @njit(cache=True)
@@ -70,9 +75,9 @@ def _gauss_markov(decay, noise, first, sigma, tau, dt):
     d = 1.0
     if tau > 0.0:
         d = exp(-dt / tau)
-    for i in range(first, first + 3):
-        decay[i] = d
-        noise[i] = sigma * sigma * (1.0 - d * d)
+    for i in range(3):
+        decay[first + i] = d
+        noise[first + i] = sigma[i] * sigma[i] * (1.0 - d * d)
 
 
 @njit(cache=True)
@@ -94,12 +99,22 @@ def _advance(s, cfg, work, t):
     nav = s["nav"]
     w, f = work["w"], work["f"]
     _remove_sensor_errors(s, work)
+    r, moved = nav["r"], s["moved"]
+    for i in range(3):
+        moved[i] -= r[i]
     mechanize(nav, w[0] * dt, w[1] * dt, w[2] * dt, f[0] * dt, f[1] * dt, f[2] * dt, dt, work["q"])
     _decay_and_noise(cfg, work, dt)
     propagate(
         s["P"], state_count(cfg), cfg["states"] == 21, nav["r"], nav["C"], nav["f_e"], f, w, dt,
         work["decay"], work["noise"], work["T"],
     )  # fmt: skip
+    smooth = 1.0
+    if cfg["nhc_smoothing"] > 0.0:
+        smooth = 1.0 - exp(-dt / cfg["nhc_smoothing"])
+    w_smooth = s["w_smooth"]
+    for i in range(3):
+        moved[i] += r[i]
+        w_smooth[i] += smooth * (w[i] - w_smooth[i])
     decay = work["decay"]
     bg, ba, sg, sa = s["bg"], s["ba"], s["sg"], s["sa"]
     for i in range(3):
@@ -193,6 +208,8 @@ def _emit_epoch(s, cfg, log_t, rows, covariances, counts):
     row["mount"][0] = 0.0
     row["mount"][1] = s["mount"][0]
     row["mount"][2] = s["mount"][1]
+    for i in range(3):
+        row["point"][i] = s["point"][i]
     n = state_count(cfg)
     k = 0
     P = s["P"]
@@ -207,7 +224,6 @@ def _use_fix(s, cfg, work, fix, log_t, out):
     """Update with one fix at the filter's own time."""
     solutions, epochs, covariances, innovations, events, counts = out
     t = fix["t"]
-    s["fix_seen_t"] = t
     _remove_sensor_errors(s, work)
     force = cfg["rejections"] > 0 and s["rejected"] >= cfg["rejections"]
     used = position_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
@@ -226,6 +242,7 @@ def _use_fix(s, cfg, work, fix, log_t, out):
         record_event(events, counts, t, log_t, EVENT_REJECTED, float(s["rejected"]), NOTE_FIX)
     if fix["has_v"] == 1 and cfg["use_velocity"] == 1:
         velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
+    mark_epoch(s, fix)
     _emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
     _emit_epoch(s, cfg, log_t, epochs, covariances, counts)
 
@@ -241,7 +258,7 @@ def _constrain(s, cfg, work, t, log_t, out):
         s["stop_last"] = t
         v = s["nav"]["v"]
         speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        still = speed <= cfg["stop_speed"] and is_still(s, cfg, True)
+        still = speed <= cfg["stop_speed"] and is_still(s, cfg, work, True)
         if still != (s["stopped"] == 1):
             kind = EVENT_STOP_BEGIN if still else EVENT_STOP_END
             record_event(events, counts, t, log_t, kind, speed, NOTE_IMU)
@@ -274,7 +291,7 @@ def _take_fixes(s, cfg, work, fixes, first, t, log_t, out):
     while k < fixes.shape[0] and fixes[k]["t"] <= t and fixes[k]["log_t"] <= log_t:
         fix = fixes[k]
         k += 1
-        if not (_finite(fix["r"]) and _finite(fix["R"])):
+        if not (_finite(fix["r"]) and _finite(fix["R"]) and _finite(fix["R"][3:])):
             record_event(events, counts, fix["t"], log_t, EVENT_NOT_FINITE, 0.0, NOTE_FIX)
             continue
         if s["mode"] != RUNNING:
@@ -285,7 +302,7 @@ def _take_fixes(s, cfg, work, fixes, first, t, log_t, out):
                 )  # fmt: skip
             elif align_fix(s, cfg, work, fix, log_t, events, counts):
                 s["fix_t"] = fix["t"]
-                s["fix_seen_t"] = fix["t"]
+                mark_epoch(s, fix)
                 s["stop_last"] = fix["t"]
                 s["nhc_last"] = fix["t"]
                 _emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)

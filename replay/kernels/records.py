@@ -10,7 +10,7 @@ import numpy as np
 
 from replay.kernels.strapdown import NAVIGATION_DTYPE
 
-MAX_STATES: Final = 24
+MAX_STATES: Final = 25
 WINDOW: Final = 512  # inertial samples that the stop detector can look back at most
 
 # How far the filter has come.
@@ -20,25 +20,28 @@ RUNNING: Final = 2
 
 CONFIG_DTYPE: Final = np.dtype(
     [
-        ("states", "<i8"),  # 15 or 21, without the mounting states
+        ("states", "<i8"),  # 15 or 21, without those of the vehicle
         ("mounting", "<i8"),  # 1 where mounting pitch and yaw are estimated
-        ("gyro_noise", "<f8"),  # rad/sqrt(s)
-        ("accel_noise", "<f8"),  # m/s/sqrt(s)
-        ("gyro_bias_sigma", "<f8"),  # rad/s
+        ("lever", "<i8"),  # 1 where the point that does not slip is estimated
+        ("gyro_noise", "<f8", 3),  # rad/sqrt(s)
+        ("accel_noise", "<f8", 3),  # m/s/sqrt(s)
+        ("gyro_bias_sigma", "<f8", 3),  # rad/s
         ("gyro_bias_tau", "<f8"),  # s
-        ("accel_bias_sigma", "<f8"),  # m/s^2
+        ("accel_bias_sigma", "<f8", 3),  # m/s^2
         ("accel_bias_tau", "<f8"),  # s
-        ("gyro_scale_sigma", "<f8"),
+        ("gyro_scale_sigma", "<f8", 3),
         ("gyro_scale_tau", "<f8"),  # s
-        ("accel_scale_sigma", "<f8"),
+        ("accel_scale_sigma", "<f8", 3),
         ("accel_scale_tau", "<f8"),  # s
         ("mounting_sigma", "<f8"),  # rad
         ("mounting_noise", "<f8"),  # rad/sqrt(s)
-        ("gyro_bias_initial", "<f8"),  # rad/s
-        ("accel_bias_initial", "<f8"),  # m/s^2
+        ("lever_sigma", "<f8", 2),  # m, forward and down
+        ("gyro_bias_initial", "<f8", 3),  # rad/s
+        ("accel_bias_initial", "<f8", 3),  # m/s^2
         ("tilt_initial", "<f8"),  # rad
         ("heading_initial", "<f8"),  # rad
         ("velocity_initial", "<f8"),  # m/s
+        ("rest_sigma", "<f8"),  # m/s^2 of the specific force at rest against gravity
         # alignment
         ("rest_time", "<f8"),  # s at rest before levelling
         ("course_speed", "<f8"),  # m/s from which the course gives the heading
@@ -47,8 +50,9 @@ CONFIG_DTYPE: Final = np.dtype(
         ("use_velocity", "<i8"),
         ("position_gate", "<f8"),  # chi-square of three
         ("velocity_gate", "<f8"),  # chi-square of three
-        ("position_floor", "<f8"),  # m added to the stated deviation, in quadrature
-        ("velocity_floor", "<f8"),  # m/s, likewise
+        ("velocity_window", "<f8"),  # s over which the receiver averages velocity
+        ("position_floor", "<f8", 3),  # m added to the stated deviation, in quadrature
+        ("velocity_floor", "<f8", 3),  # m/s, likewise
         ("position_scale", "<f8"),  # factor on the stated deviation
         ("velocity_scale", "<f8"),
         ("rejections", "<i8"),  # in a row, after which a position is believed
@@ -58,15 +62,17 @@ CONFIG_DTYPE: Final = np.dtype(
         ("zero_rate", "<i8"),
         ("stop_window", "<f8"),  # s
         ("stop_interval", "<f8"),  # s between updates
-        ("stop_accel", "<f8"),  # m/s^2, standard deviation of the specific force's length
-        ("stop_gyro", "<f8"),  # rad/s, standard deviation per axis, root sum square
-        ("stop_rate", "<f8"),  # rad/s, length of the mean rate, bias removed
+        ("stop_block", "<i8"),  # samples that are averaged before the window is looked at
+        ("stop_accel", "<f8"),  # m/s^2, largest block mean off the window's, each axis
+        ("stop_gyro", "<f8"),  # rad/s, likewise about the down axis
+        ("stop_rate", "<f8"),  # rad/s, mean rate about the down axis, bias removed
         ("stop_speed", "<f8"),  # m/s, above which the filter does not believe in a stop
         ("zero_velocity_sigma", "<f8"),  # m/s
-        ("zero_rate_sigma", "<f8"),  # rad/s
+        ("zero_rate_sigma", "<f8", 3),  # rad/s
         # non-holonomic
         ("non_holonomic", "<i8"),
         ("nhc_interval", "<f8"),  # s between updates
+        ("nhc_smoothing", "<f8"),  # s, first-order low-pass of the rate at the lever arm
         ("nhc_right_sigma", "<f8"),  # m/s
         ("nhc_down_sigma", "<f8"),  # m/s
         ("nhc_rate_sigma", "<f8"),  # (m/s) per (rad/s) of turning, added in quadrature
@@ -93,6 +99,8 @@ STATE_DTYPE: Final = np.dtype(
         ("sg", "<f8", 3),
         ("sa", "<f8", 3),
         ("mount", "<f8", 2),  # rad: pitch, yaw
+        ("point", "<f8", 3),  # m, body: where the vehicle does not slip
+        ("w_smooth", "<f8", 3),  # rad/s, low-passed rate
         ("w_raw", "<f8", 3),  # rad/s, last sample
         ("f_raw", "<f8", 3),  # m/s^2, last sample
         # stop detector
@@ -106,13 +114,16 @@ STATE_DTYPE: Final = np.dtype(
         ("rest_count", "<i8"),
         ("rest_sum", "<f8", 6),  # over the samples at rest
         ("rest_q", "<f8", 4),  # body at rest to a level frame of unknown heading
+        ("rest_f", "<f8", 3),  # m/s^2, mean specific force at rest, body
         ("align_q", "<f8", 4),  # body now to the same frame
         ("align_fix_t", "<i8"),  # ns of the fix before, minus one where there is none
         ("align_fix_r", "<f8", 3),  # m, ECEF
         ("align_speed", "<f8"),  # m/s at the fix before, minus one where unknown
         # GNSS bookkeeping
         ("fix_t", "<i8"),  # ns of the last position that was used
-        ("fix_seen_t", "<i8"),  # ns of the last position that came
+        ("moved_t", "<i8"),  # ns since when displacement is summed
+        ("moved", "<f8", 3),  # m, ECEF: integral of velocity since then
+        ("moved_lever", "<f8", 3),  # m, ECEF: antenna lever arm then
         ("rejected", "<i8"),  # positions in a row
         ("in_outage", "<i8"),
         ("emitted_slot", "<i8"),  # solution intervals since the GPS epoch at the last row
@@ -163,6 +174,7 @@ EPOCH_DTYPE: Final = np.dtype(
         ("sg", "<f8", 3),
         ("sa", "<f8", 3),
         ("mount", "<f8", 3),
+        ("point", "<f8", 3),
     ],
     align=True,
 )
@@ -209,6 +221,8 @@ WORK_DTYPE: Final = np.dtype(
         ("N", "<f8", (3, 3)),
         ("f", "<f8", 3),  # m/s^2, body, sensor errors removed
         ("w", "<f8", 3),  # rad/s, body, sensor errors removed
+        ("mean", "<f8", 6),
+        ("part", "<f8", 6),
         ("decay_dt", "<f8"),  # s, interval that decay and noise belong to
     ],
     align=True,
@@ -242,7 +256,7 @@ STATUS_OUTAGE: Final = 3
 def new_state() -> np.ndarray[Any, Any]:
     """One state record of a filter that has seen nothing."""
     state = np.zeros(1, dtype=STATE_DTYPE)
-    for name in ("imu_t", "align_fix_t", "fix_t", "fix_seen_t", "emitted_t", "stop_last"):
+    for name in ("imu_t", "align_fix_t", "fix_t", "moved_t", "emitted_t", "stop_last"):
         state[name] = -1
     state["nhc_last"] = -1
     state["align_speed"] = -1.0

@@ -19,17 +19,19 @@ from replay.kernels.kalman import (
     whitened_update,
 )
 from replay.kernels.rotation import (
+    cross3,
     matrix_from_quaternion,
     quaternion_from_vector,
     quaternion_multiply,
     quaternion_normalize,
+    rotate3,
 )
 
 
 @njit(cache=True)
 def state_count(cfg):
     """Number of error states of a configuration."""
-    return cfg["states"] + 2 * cfg["mounting"]
+    return cfg["states"] + 2 * cfg["mounting"] + 2 * cfg["lever"]
 
 
 @njit(cache=True)
@@ -38,6 +40,14 @@ def feed_back(s, cfg, dx, scratch):
     nav = s["nav"]
     r, v, q = nav["r"], nav["v"], nav["q"]
     bg, ba = s["bg"], s["ba"]
+    # The displacement summed so far was as wrong as the state is now known to have been.
+    span = (s["t"] - s["moved_t"]) * 1e-9
+    C, f, moved = nav["C"], nav["f_e"], s["moved"]
+    a0, a1, a2 = cross3(f[0], f[1], f[2], dx[ATTITUDE], dx[ATTITUDE + 1], dx[ATTITUDE + 2])
+    b0, b1, b2 = rotate3(C, dx[ACCEL_BIAS], dx[ACCEL_BIAS + 1], dx[ACCEL_BIAS + 2])
+    moved[0] += span * (dx[VELOCITY] + 0.5 * span * (a0 + b0))
+    moved[1] += span * (dx[VELOCITY + 1] + 0.5 * span * (a1 + b1))
+    moved[2] += span * (dx[VELOCITY + 2] + 0.5 * span * (a2 + b2))
     for i in range(3):
         r[i] += dx[POSITION + i]
         v[i] += dx[VELOCITY + i]
@@ -52,6 +62,11 @@ def feed_back(s, cfg, dx, scratch):
         mount = s["mount"]
         mount[0] += dx[cfg["states"]]
         mount[1] += dx[cfg["states"] + 1]
+    if cfg["lever"] == 1:
+        first = cfg["states"] + 2 * cfg["mounting"]
+        point = s["point"]
+        point[0] += dx[first]
+        point[2] += dx[first + 1]
     quaternion_from_vector(dx[ATTITUDE], dx[ATTITUDE + 1], dx[ATTITUDE + 2], scratch[0])
     quaternion_multiply(scratch[0], q, scratch[1])
     for i in range(4):
@@ -155,15 +170,14 @@ def update(s, cfg, work, k, count, gate, force, kind, axis, t, log_t, innovation
 
 @njit(cache=True)
 def fill_covariance(R, c, scale, floor):
-    """(3, 3) from an upper triangle, scaled, with floor^2 added to the diagonal."""
+    """(3, 3) from an upper triangle, scaled, with the squares of `floor` (3) on the diagonal."""
     k = scale * scale
-    f = floor * floor
-    R[0, 0] = k * c[0] + f
+    R[0, 0] = k * c[0] + floor[0] * floor[0]
     R[0, 1] = k * c[1]
     R[0, 2] = k * c[2]
-    R[1, 1] = k * c[3] + f
+    R[1, 1] = k * c[3] + floor[1] * floor[1]
     R[1, 2] = k * c[4]
-    R[2, 2] = k * c[5] + f
+    R[2, 2] = k * c[5] + floor[2] * floor[2]
     R[1, 0] = R[0, 1]
     R[2, 0] = R[0, 2]
     R[2, 1] = R[1, 2]

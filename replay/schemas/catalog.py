@@ -26,6 +26,7 @@ FIELD_NOTES: Final[dict[str, str]] = {
     "replay.FilterState.gyro_scale_factor": "1; body, zero where not estimated",
     "replay.FilterState.accel_scale_factor": "1; body, zero where not estimated",
     "replay.FilterState.mounting_angles_rad": "rad; vehicle to body roll, pitch, yaw, zero where not estimated",
+    "replay.FilterState.non_slip_point_body_m": "m; body, IMU to the point that moves forward only",
     "replay.FilterCovariance.dimension": "1",
     "replay.FilterCovariance.state_names": "comma-separated, in the order of rows",
     "replay.FilterCovariance.upper_triangle": "products of state units; row by row, diagonal included",

@@ -126,7 +126,12 @@ class GnssInsLoose:
 
     def _run(self, state: LooseState, ready: int) -> Outputs:
         samples, fixes = ready, len(state.pending)
-        states = int(state.config["states"][0] + 2 * state.config["mounting"][0])
+        names = state_names(
+            int(state.config["states"][0]),
+            mounting=bool(state.config["mounting"][0]),
+            lever=bool(state.config["lever"][0]),
+        )
+        states = len(names)
         # Rows that a block can give at most: predictions, one before and one at each fix.
         solutions = np.zeros(samples + 2 * fixes, dtype=records.SOLUTION_DTYPE)
         epochs = np.zeros(fixes, dtype=records.EPOCH_DTYPE)
@@ -153,15 +158,12 @@ class GnssInsLoose:
         state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
         state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
         state.pending = state.pending[taken:]
-        names = ",".join(
-            state_names(int(state.config["states"][0]), mounting=bool(state.config["mounting"][0]))
-        )
         epochs = epochs[: counts[1]]
         outputs = {
             channels.FILTER_INNOVATIONS.name: _innovation_columns(innovations[: counts[2]]),
             channels.FILTER_STATE.name: _state_columns(epochs),
             channels.FILTER_COVARIANCE.name: _covariance_columns(
-                epochs, covariances[: counts[1]], names, states
+                epochs, covariances[: counts[1]], names
             ),
             channels.FILTER_EVENTS.name: _event_columns(events[: counts[3]]),
             channels.SOLUTION.name: _solution_columns(solutions[: counts[0]]),
@@ -191,8 +193,6 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
         raise ConfigurationError(
             f"filter.states is {config.filter.states}", mend="take 15, or 21 with scale factors"
         )
-    if len(config.non_holonomic.lever_arm) != 3:
-        raise ConfigurationError("non_holonomic.lever_arm has three numbers: forward, right, down")
     if config.output.solution_interval <= 0.0:
         raise ConfigurationError("output.solution_interval is more than zero seconds")
     interval = config.imu.interval
@@ -214,6 +214,9 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
         "mounting": int(nhc.enabled and nhc.mounting),
         "mounting_sigma": nhc.mounting_sigma,
         "mounting_noise": nhc.mounting_noise,
+        "lever": int(nhc.enabled and nhc.estimate_lever_arm),
+        "lever_sigma": nhc.lever_arm_sigma,
+        "rest_sigma": align.rest_sigma,
         "gyro_bias_initial": align.gyro_bias_sigma,
         "accel_bias_initial": align.accel_bias_sigma,
         "tilt_initial": align.tilt_sigma,
@@ -231,6 +234,7 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
         "zero_rate": int(stops.zero_rate),
         "stop_window": stops.window,
         "stop_interval": stops.interval,
+        "stop_block": max(1, round(stops.block / interval)),
         "stop_accel": stops.accel_spread,
         "stop_gyro": stops.gyro_spread,
         "stop_rate": stops.rate,
@@ -239,6 +243,7 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
         "zero_rate_sigma": stops.rate_sigma,
         "non_holonomic": int(nhc.enabled),
         "nhc_interval": nhc.interval,
+        "nhc_smoothing": nhc.smoothing,
         "nhc_right_sigma": nhc.right_sigma,
         "nhc_down_sigma": nhc.down_sigma,
         "nhc_rate_sigma": nhc.turn_sigma,
@@ -251,7 +256,14 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
     }
     record = np.zeros(1, dtype=records.CONFIG_DTYPE)
     for name in records.CONFIG_DTYPE.names or ():
-        record[name] = values[name]
+        try:
+            record[name] = values[name]
+        except ValueError as error:
+            wanted = records.CONFIG_DTYPE[name].shape[0]
+            raise ConfigurationError(
+                f"{name.replace('nhc_', '')} has {wanted} numbers, not {len(values[name])}",
+                mend="give one number for all, or one for each",
+            ) from error
     return record
 
 
@@ -310,16 +322,17 @@ def _state_columns(rows: Array) -> Columns:
             "gyro_scale_factor": rows["sg"],
             "accel_scale_factor": rows["sa"],
             "mounting_angles_rad": rows["mount"],
+            "non_slip_point_body_m": rows["point"],
         },
     )
 
 
-def _covariance_columns(rows: Array, triangles: Array, names: str, states: int) -> Columns:
+def _covariance_columns(rows: Array, triangles: Array, names: tuple[str, ...]) -> Columns:
     return _columns(
         rows,
         {
-            "dimension": np.full(len(rows), states, dtype=np.uint32),
-            "state_names": Ragged.from_texts([names] * len(rows)),
+            "dimension": np.full(len(rows), len(names), dtype=np.uint32),
+            "state_names": Ragged.from_texts([",".join(names)] * len(rows)),
             "upper_triangle": Ragged.from_matrix(triangles),
         },
     )

@@ -1,7 +1,9 @@
 """Settings of the loosely coupled GNSS/INS filter.
 
-Defaults describe a consumer MEMS unit in a road vehicle. A log may bring better
-ones (its importer knows the instrument): `replay.defaults` in its metadata.
+Defaults describe a consumer MEMS unit. A log may bring better ones (its importer
+knows the instrument and the vehicle): `replay.defaults` in its metadata.
+
+Where three numbers are asked for, one stands for all three.
 """
 
 from __future__ import annotations
@@ -14,30 +16,53 @@ from replay.configuration import Section, quantity
 class Filter(Section):
     """States and process noise."""
 
-    states: int = 21
-    gyro_noise: Annotated[float, quantity("rad/sqrt(s)", "angle random walk")] = 2.0e-4
-    accel_noise: Annotated[float, quantity("m/s/sqrt(s)", "velocity random walk")] = 3.0e-3
-    gyro_bias_sigma: Annotated[float, quantity("rad/s", "Gauss-Markov deviation")] = 5.0e-4
-    gyro_bias_tau: Annotated[float, quantity("s", "0 is a constant")] = 500.0
-    accel_bias_sigma: Annotated[float, quantity("m/s^2", "Gauss-Markov deviation")] = 0.05
-    accel_bias_tau: Annotated[float, quantity("s", "0 is a constant")] = 500.0
-    gyro_scale_sigma: Annotated[float, quantity("1", "Gauss-Markov deviation")] = 5.0e-3
-    gyro_scale_tau: Annotated[float, quantity("s", "0 is a constant")] = 0.0
-    accel_scale_sigma: Annotated[float, quantity("1", "Gauss-Markov deviation")] = 5.0e-3
-    accel_scale_tau: Annotated[float, quantity("s", "0 is a constant")] = 0.0
+    states: int = 15
+    gyro_noise: tuple[
+        Annotated[float, quantity("rad/sqrt(s)", "angle random walk, body axes")], ...
+    ] = (3.0e-4, 3.0e-4, 3.0e-4)
+    accel_noise: tuple[
+        Annotated[float, quantity("m/s/sqrt(s)", "velocity random walk, body axes")], ...
+    ] = (5.0e-3, 5.0e-3, 5.0e-3)
+    gyro_bias_sigma: tuple[
+        Annotated[float, quantity("rad/s", "Gauss-Markov deviation, body axes")], ...
+    ] = (3.0e-4, 3.0e-4, 3.0e-4)
+    gyro_bias_tau: Annotated[float, quantity("s", "correlation time; 0 is a constant")] = 1000.0
+    accel_bias_sigma: tuple[
+        Annotated[float, quantity("m/s^2", "Gauss-Markov deviation, body axes")], ...
+    ] = (0.04, 0.04, 0.04)
+    accel_bias_tau: Annotated[float, quantity("s", "correlation time; 0 is a constant")] = 1000.0
+    gyro_scale_sigma: tuple[
+        Annotated[float, quantity("1", "Gauss-Markov deviation, body axes")], ...
+    ] = (5.0e-3, 5.0e-3, 5.0e-3)
+    gyro_scale_tau: Annotated[float, quantity("s", "correlation time; 0 is a constant")] = 0.0
+    accel_scale_sigma: tuple[
+        Annotated[float, quantity("1", "Gauss-Markov deviation, body axes")], ...
+    ] = (5.0e-3, 5.0e-3, 5.0e-3)
+    accel_scale_tau: Annotated[float, quantity("s", "correlation time; 0 is a constant")] = 0.0
 
 
 class Alignment(Section):
     """First attitude and what is known at its time."""
 
-    rest_time: Annotated[float, quantity("s", "rest before levelling")] = 2.0
-    course_speed: Annotated[float, quantity("m/s", "from which course is heading")] = 3.0
+    rest_time: Annotated[float, quantity("s", "rest before levelling")] = 3.0
+    rest_sigma: Annotated[
+        float, quantity("m/s^2", "of gravity at rest; ties tilt to bias; 0 does not")
+    ] = 0.05
+    course_speed: Annotated[float, quantity("m/s", "from which course is heading")] = 1.0
     course_turn_rate: Annotated[float, quantity("rad/s", "up to which it is")] = 0.1
-    tilt_sigma: Annotated[float, quantity("rad", "roll and pitch")] = 0.02
-    heading_sigma: Annotated[float, quantity("rad", "heading")] = 0.1
+    tilt_sigma: Annotated[float, quantity("rad", "roll and pitch")] = 0.05
+    heading_sigma: Annotated[float, quantity("rad", "heading")] = 0.07
     velocity_sigma: Annotated[float, quantity("m/s", "each axis")] = 0.3
-    gyro_bias_sigma: Annotated[float, quantity("rad/s", "each axis")] = 2.0e-3
-    accel_bias_sigma: Annotated[float, quantity("m/s^2", "each axis")] = 0.2
+    gyro_bias_sigma: tuple[Annotated[float, quantity("rad/s", "body axes")], ...] = (
+        3.0e-4,
+        3.0e-4,
+        3.0e-4,
+    )
+    accel_bias_sigma: tuple[Annotated[float, quantity("m/s^2", "body axes")], ...] = (
+        0.1,
+        0.1,
+        0.1,
+    )
 
 
 class Gnss(Section):
@@ -45,14 +70,21 @@ class Gnss(Section):
 
     receiver: str = ""
     use_velocity: bool = True
+    velocity_window: Annotated[
+        float, quantity("s", "over which the receiver averages velocity; 0 is an instant")
+    ] = 0.0
     latency: Annotated[float, quantity("s", "inertial rows wait this long for a fix")] = 0.0
-    position_gate: Annotated[float, quantity("1", "chi-square of 3; 0 lets all in")] = 25.0
-    velocity_gate: Annotated[float, quantity("1", "chi-square of 3; 0 lets all in")] = 25.0
-    position_floor: Annotated[float, quantity("m", "added in quadrature")] = 0.01
-    velocity_floor: Annotated[float, quantity("m/s", "added in quadrature")] = 0.02
+    position_gate: Annotated[float, quantity("1", "chi-square of 3; 0 lets all in")] = 60.0
+    velocity_gate: Annotated[float, quantity("1", "chi-square of 3; 0 lets all in")] = 60.0
+    position_floor: tuple[
+        Annotated[float, quantity("m", "east, north, up; added in quadrature")], ...
+    ] = (0.01, 0.01, 0.02)
+    velocity_floor: tuple[
+        Annotated[float, quantity("m/s", "east, north, up; added in quadrature")], ...
+    ] = (0.03, 0.03, 0.05)
     position_scale: Annotated[float, quantity("1", "on the stated deviation")] = 1.0
     velocity_scale: Annotated[float, quantity("1", "on the stated deviation")] = 1.0
-    rejections: int = 10
+    rejections: int = 8
     outage_limit: Annotated[float, quantity("s", "without a position")] = 1.5
 
 
@@ -61,14 +93,19 @@ class Stops(Section):
 
     zero_velocity: bool = False
     zero_rate: bool = False
-    window: Annotated[float, quantity("s", "of inertial samples")] = 1.0
-    interval: Annotated[float, quantity("s", "between updates")] = 0.2
-    accel_spread: Annotated[float, quantity("m/s^2", "largest deviation at rest")] = 0.15
-    gyro_spread: Annotated[float, quantity("rad/s", "largest deviation at rest")] = 0.02
-    rate: Annotated[float, quantity("rad/s", "largest mean rate at rest")] = 0.01
-    speed: Annotated[float, quantity("m/s", "largest speed that is believed a stop")] = 0.5
-    velocity_sigma: Annotated[float, quantity("m/s", "of a stop")] = 0.02
-    rate_sigma: Annotated[float, quantity("rad/s", "of a stop")] = 2.0e-3
+    window: Annotated[float, quantity("s", "of inertial samples")] = 2.0
+    block: Annotated[float, quantity("s", "averaged before the window is looked at")] = 0.1
+    interval: Annotated[float, quantity("s", "between updates")] = 0.25
+    accel_spread: Annotated[float, quantity("m/s^2", "of block means at rest, each axis")] = 0.1
+    gyro_spread: Annotated[float, quantity("rad/s", "of block means, down axis")] = 2.6e-3
+    rate: Annotated[float, quantity("rad/s", "mean rate at rest, down axis")] = 2.6e-3
+    speed: Annotated[float, quantity("m/s", "largest speed that is believed a stop")] = 3.0
+    velocity_sigma: Annotated[float, quantity("m/s", "of a stop")] = 0.05
+    rate_sigma: tuple[Annotated[float, quantity("rad/s", "of a stop, body axes")], ...] = (
+        2.6e-3,
+        2.6e-3,
+        1.0e-3,
+    )
 
 
 class NonHolonomic(Section):
@@ -76,17 +113,22 @@ class NonHolonomic(Section):
 
     enabled: bool = False
     interval: Annotated[float, quantity("s", "between updates")] = 0.1
-    right_sigma: Annotated[float, quantity("m/s", "slip to the right")] = 0.1
-    down_sigma: Annotated[float, quantity("m/s", "slip down")] = 0.1
-    turn_sigma: Annotated[float, quantity("m", "added per rad/s of turning")] = 0.3
-    speed: Annotated[float, quantity("m/s", "below which it is not used")] = 1.0
-    gate: Annotated[float, quantity("1", "chi-square of 2; 0 lets all in")] = 14.0
+    smoothing: Annotated[float, quantity("s", "low-pass of the rate at the lever arm")] = 0.1
+    right_sigma: Annotated[float, quantity("m/s", "slip to the right")] = 0.05
+    down_sigma: Annotated[float, quantity("m/s", "slip down")] = 0.15
+    turn_sigma: Annotated[float, quantity("m", "added per rad/s of turning")] = 0.0
+    speed: Annotated[float, quantity("m/s", "below which it is not used")] = 0.3
+    gate: Annotated[float, quantity("1", "chi-square of 2; 0 lets all in")] = 100.0
     lever_arm: tuple[
         Annotated[float, quantity("m", "body, IMU to the point that does not slip")], ...
-    ] = (0.0, 0.0, 0.0)
+    ] = (0.0, 0.0, 1.0)
+    estimate_lever_arm: bool = True
+    lever_arm_sigma: tuple[
+        Annotated[float, quantity("m", "forward and down coordinate at the start")], ...
+    ] = (1.0, 0.5)
     mounting: bool = True
-    mounting_sigma: Annotated[float, quantity("rad", "pitch and yaw at the start")] = 0.03
-    mounting_noise: Annotated[float, quantity("rad/sqrt(s)", "their random walk")] = 1.0e-5
+    mounting_sigma: Annotated[float, quantity("rad", "pitch and yaw at the start")] = 0.02
+    mounting_noise: Annotated[float, quantity("rad/sqrt(s)", "their random walk")] = 0.0
 
 
 class Imu(Section):

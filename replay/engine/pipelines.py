@@ -1,0 +1,64 @@
+"""The pipelines by name: which stages run, in which order, with which settings."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from replay.configuration import Section
+from replay.errors import UsageError
+from replay.stages.base import Stage
+from replay.stages.gnss_ins_lc import GnssInsLoose
+from replay.stages.loose_config import LooseConfig
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Pipeline:
+    """A name for a graph of stages.
+
+    Attributes
+    ----------
+    name : str
+    about : str
+        One line for a person.
+    config : type
+        Settings that all its stages are started with; their `name` names the run.
+    stages : callable
+        Makes the stages, in an order in which every input stands before its reader.
+    """
+
+    name: str
+    about: str
+    config: type[Section]
+    stages: Callable[[], tuple[Stage[Any], ...]]
+
+
+_ALL: Final = (
+    Pipeline(
+        "gnss-ins-lc",
+        "loosely coupled GNSS/INS: position and velocity fixes with inertial samples",
+        LooseConfig,
+        lambda: (GnssInsLoose(),),
+    ),
+)
+
+PIPELINES: Final[Mapping[str, Pipeline]] = {pipeline.name: pipeline for pipeline in _ALL}
+
+
+def find_pipeline(name: str) -> Pipeline:
+    """Pipeline of a name.
+
+    Raises
+    ------
+    UsageError
+        For an unknown name; the nearest known one is named.
+    """
+    if name in PIPELINES:
+        return PIPELINES[name]
+    near = difflib.get_close_matches(name, PIPELINES, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    raise UsageError(
+        f"no pipeline {name!r}", mend=f"{hint}`replay pipelines` lists: {', '.join(PIPELINES)}"
+    )

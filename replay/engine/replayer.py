@@ -1,0 +1,283 @@
+"""The replayer: a log through a pipeline into a log.
+
+Rows go through in blocks; each stage takes its inputs' rows and its outputs are
+rows for the stages after it. What was recorded passes through untouched, so that
+the result can be replayed itself. No wall clock, no environment, no random state.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from replay import channels, time
+from replay.channels import CHECKPOINT, TRACE, ChannelSpec
+from replay.engine.blocks import Batch, head, merge_rows, until
+from replay.engine.floating_point import require_ieee_arithmetic
+from replay.engine.graph import Node, bind
+from replay.engine.job import Job
+from replay.engine.pipelines import find_pipeline
+from replay.engine.sink import Sink, announce_as_recorded, recorded_depth
+from replay.engine.trace import StageTrace
+from replay.errors import LossReport, UsageError
+from replay.log import codec
+from replay.log.columns import Columns, Ragged
+from replay.log.digest import ChannelDigest
+from replay.log.reader import LogReader
+from replay.schemas import replay_pb2
+from replay.stages.base import Context
+
+Progress = Callable[[float], None]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Result:
+    """What a run gave.
+
+    Attributes
+    ----------
+    inputs, outputs : mapping of topic to ChannelDigest
+    first_ns, last_ns : int, GPS ns
+        Log times of the first and last row.
+    losses : LossReport
+        What was skipped on the way.
+    notes : tuple of str
+    """
+
+    inputs: Mapping[str, ChannelDigest]
+    outputs: Mapping[str, ChannelDigest]
+    first_ns: int
+    last_ns: int
+    losses: LossReport
+    notes: tuple[str, ...]
+
+
+class Replayer:
+    """One run of a job.
+
+    Parameters
+    ----------
+    reader : LogReader
+        The input.
+    job : Job
+    """
+
+    def __init__(self, reader: LogReader, job: Job) -> None:
+        require_ieee_arithmetic()
+        self.reader = reader
+        self.job = job
+        stages = find_pipeline(job.pipeline).stages()
+        self.recorded = {
+            topic: info
+            for topic, info in reader.channels.items()
+            if channels.find(topic) not in (TRACE, CHECKPOINT)
+        }
+        receiver = getattr(getattr(job.config, "gnss", None), "receiver", "")
+        name = str(getattr(job.config, "name", job.pipeline))
+        self.nodes = bind(stages, self._depths(), run=name, receiver=receiver)
+        self.traces = [StageTrace(node) for node in self.nodes]
+        self.states = [self._start(node) for node in self.nodes]
+        self.depth = 1 + max(node.depth for node in self.nodes)
+        self._trace_rows = 0
+        self._checkpoint_rows = 0
+        self._first_ns = -1
+        self._last_ns = -1
+
+    def run(
+        self, sink: Sink, *, resume: LogReader | None = None, progress: Progress | None = None
+    ) -> Result:
+        """Take every row of the input; rows go to `sink`.
+
+        Parameters
+        ----------
+        sink : Sink
+        resume : LogReader, optional
+            A log of the same job that ended early; its rows up to its last whole
+            checkpoint are taken over.
+        progress : callable, optional
+            Told the fraction done.
+        """
+        self._announce(sink)
+        start_ns = self.job.start_ns
+        if resume is not None:
+            start_ns = self._take_over(resume, sink)
+        decode = {topic for node in self.nodes for topic in node.inputs.values()}
+        batches = self.reader.batches(
+            list(self.recorded),
+            decode=[topic for topic in self.recorded if topic in decode],
+            payloads=list(self.recorded),
+            start_ns=start_ns,
+            end_ns=self.job.end_ns,
+        )
+        begin = self.reader.start_ns if self.job.start_ns is None else self.job.start_ns
+        end = self.reader.end_ns if self.job.end_ns is None else self.job.end_ns
+        for batch, checkpoint_ns in self._cut(batches):
+            if batch:
+                self._step(batch, sink)
+                if progress is not None and end > begin:
+                    progress(min(1.0, (self._last_ns - begin) / (end - begin)))
+            if checkpoint_ns is not None:
+                self._checkpoint(checkpoint_ns, sink)
+        self._finish(sink)
+        digests = sink.digests()
+        return Result(
+            {topic: digests[topic] for topic in sorted(self.recorded)},
+            {topic: digests[topic] for topic in sorted(digests) if topic not in self.recorded},
+            self._first_ns,
+            self._last_ns,
+            self.reader.report,
+            self._notes(),
+        )
+
+    def stage_records(self) -> list[replay_pb2.StageRecord]:
+        """Stages for the manifest."""
+        return [
+            replay_pb2.StageRecord(
+                name=node.stage.spec.name,
+                version=node.stage.spec.version,
+                inputs=list(node.inputs.values()),
+                outputs=list(node.outputs.values()),
+            )
+            for node in self.nodes
+        ]
+
+    def _depths(self) -> dict[str, int]:
+        return {topic: recorded_depth(info) for topic, info in self.recorded.items()}
+
+    def _start(self, node: Node) -> Any:
+        topics = {**node.inputs, **node.outputs}
+        heads = {
+            name: head(self.reader, topic)
+            for name, topic in node.inputs.items()
+            if topic in self.recorded
+        }
+        return node.stage.start(self.job.config, Context(topics, heads))
+
+    def _announce(self, sink: Sink) -> None:
+        for topic, info in self.recorded.items():
+            announce_as_recorded(sink, topic, info)
+        for node in self.nodes:
+            specs = {spec.name: spec for spec in node.stage.spec.outputs}
+            for name, topic in node.outputs.items():
+                sink.add_channel(topic, specs[name].message, depth=node.depth)
+        sink.add_channel(TRACE.topic, TRACE.message, depth=self.depth)
+        if self.job.checkpoint_every_s > 0:
+            sink.add_channel(CHECKPOINT.topic, CHECKPOINT.message, depth=self.depth)
+
+    def _cut(self, batches: Iterator[dict[str, Columns]]) -> Iterator[tuple[Batch, int | None]]:
+        """Batches, cut where a checkpoint is due, with the time of the checkpoint after each."""
+        every = self.job.checkpoint_every_s * time.NS_PER_S
+        for batch in batches:
+            whole = {topic: rows for topic, rows in batch.items() if len(rows)}
+            if not whole:
+                continue
+            if self._first_ns < 0:
+                self._first_ns = min(int(rows.log_time_ns[0]) for rows in whole.values())
+            last = max(int(rows.log_time_ns[-1]) for rows in whole.values())
+            if every > 0:
+                seen = max(self._last_ns, self._first_ns)
+                due = self._first_ns + ((seen - self._first_ns) // every + 1) * every
+                while due <= last:
+                    yield until(whole, due, included=True), due
+                    whole = until(whole, due, included=False)
+                    due += every
+            yield whole, None
+
+    def _step(self, batch: Batch, sink: Sink) -> None:
+        rows = dict(batch)
+        for node_index, node in enumerate(self.nodes):
+            block = {name: rows[topic] for name, topic in node.inputs.items() if topic in rows}
+            state, outputs = node.stage.step(self.states[node_index], block)
+            self.states[node_index] = state
+            rows.update(self._encoded(node, outputs))
+        self._last_ns = max(int(columns.log_time_ns[-1]) for columns in batch.values())
+        self._write(rows, [trace.update(rows) for trace in self.traces], sink)
+
+    def _finish(self, sink: Sink) -> None:
+        rows: dict[str, Columns] = {}
+        for node, state in zip(self.nodes, self.states, strict=True):
+            rows.update(self._encoded(node, node.stage.finish(state)))
+        self._write(rows, [trace.finish() for trace in self.traces], sink)
+
+    @staticmethod
+    def _encoded(node: Node, outputs: Mapping[str, Columns]) -> dict[str, Columns]:
+        specs = {spec.name: spec for spec in node.stage.spec.outputs}
+        return {
+            node.outputs[name]: encoded(specs[name], columns) for name, columns in outputs.items()
+        }
+
+    def _write(self, rows: Mapping[str, Columns], traces: list[Columns | None], sink: Sink) -> None:
+        """Write rows, and the trace rows of all stages merged by time."""
+        parts = [part for part in traces if part is not None]
+        written = dict(rows)
+        if parts:
+            merged = merge_rows(parts)
+            count = len(merged)
+            merged.sequence[:] = np.arange(self._trace_rows, self._trace_rows + count)
+            self._trace_rows += count
+            written[TRACE.topic] = encoded(TRACE, merged)
+        if written:
+            sink.write(written)
+
+    def _checkpoint(self, at_ns: int, sink: Sink) -> None:
+        names, steps, blobs = [], [], []
+        for node, state, trace in zip(self.nodes, self.states, self.traces, strict=True):
+            own = trace.dump()
+            names.append(node.stage.spec.name)
+            steps.append(trace.step)
+            blobs.append(len(own).to_bytes(8, "little") + own + node.stage.dump(state))
+        rows = Columns.build(
+            np.full(len(names), at_ns, dtype=np.int64),
+            {
+                "stage": Ragged.from_texts(names),
+                "step": np.array(steps, dtype=np.uint64),
+                "state": Ragged.from_blobs(blobs),
+            },
+            sequence_start=self._checkpoint_rows,
+        )
+        self._checkpoint_rows += len(names)
+        sink.write({CHECKPOINT.topic: encoded(CHECKPOINT, rows)})
+
+    def _take_over(self, resume: LogReader, sink: Sink) -> int:
+        """Copy an earlier run up to its last checkpoint; the log time to go on from."""
+        if CHECKPOINT.topic not in resume.channels:
+            raise UsageError(
+                "the earlier run holds no checkpoint", mend="run with --checkpoint-every SECONDS"
+            )
+        saved = resume.read(CHECKPOINT.topic)
+        if len(saved) < len(self.nodes):
+            raise UsageError("the earlier run ended before its first checkpoint")
+        times, counts = np.unique(saved.valid_time_ns, return_counts=True)
+        at_ns = int(times[counts == len(self.nodes)][-1])
+        chosen = saved.take(saved.valid_time_ns == at_ns)
+        by_stage = dict(
+            zip(chosen.ragged("stage").texts(), chosen.ragged("state").blobs(), strict=True)
+        )
+        for index, (node, trace) in enumerate(zip(self.nodes, self.traces, strict=True)):
+            blob = by_stage[node.stage.spec.name]
+            length = int.from_bytes(blob[:8], "little")
+            trace.restore(blob[8 : 8 + length])
+            self.states[index] = node.stage.restore(self.states[index], blob[8 + length :])
+        topics = list(resume.channels)
+        for batch in resume.batches(topics, decode=[], payloads=topics, end_ns=at_ns + 1):
+            kept = {topic: rows for topic, rows in batch.items() if len(rows)}
+            if not kept:
+                continue
+            if self._first_ns < 0:
+                self._first_ns = min(int(rows.log_time_ns[0]) for rows in kept.values())
+            self._trace_rows += len(kept[TRACE.topic]) if TRACE.topic in kept else 0
+            self._checkpoint_rows += len(kept[CHECKPOINT.topic]) if CHECKPOINT.topic in kept else 0
+            sink.write(kept)
+        self._last_ns = at_ns
+        return at_ns + 1
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(str(loss) for loss in self.reader.report.losses)
+
+
+def encoded(spec: ChannelSpec, columns: Columns) -> Columns:
+    """The same rows with their payloads."""
+    return dataclasses.replace(columns, payloads=codec.codec_for(spec.message).encode(columns))
