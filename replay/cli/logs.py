@@ -1,0 +1,128 @@
+"""Commands about logs: import, info, doctor, recover."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from replay.cli.app import app, err, leave, out
+from replay.cli.runs import Output
+
+_SHOWN_GAPS = 3
+
+
+@app.command("import")
+def import_(
+    spec: Annotated[Path, typer.Argument(help="TOML file: files, columns, units, axes, times.")],
+    data: Annotated[Path, typer.Option(help="Folder of the files.")],
+    output: Output,
+) -> None:
+    """Make a log from files as a spec describes them."""
+    from replay.importers import import_log
+
+    result = import_log(spec, data, output)
+    table = Table("channel", "rows", "sha256", title=str(output), title_justify="left")
+    for topic, digest in result.outputs.items():
+        table.add_row(topic, f"{digest.message_count:,}", digest.sha256[:16])
+    out.print(table)
+    for note in result.notes:
+        out.print(f"note: {note}")
+    for loss in result.losses.losses:
+        err.print(f"skipped: {loss}")
+    leave(result.exit_code)
+
+
+@app.command()
+def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
+    """Show channels, rates, spans, gaps and digests."""
+    from replay import time
+    from replay.log.describe import describe
+
+    found = describe(log)
+    packed = ", ".join(
+        f"{name or 'not compressed'} {stats.packed_bytes / max(1, stats.plain_bytes):.0%}"
+        for name, stats in found.compression.items()
+    )
+    out.print(f"{found.path}: {found.file_bytes / 1e6:,.1f} MB, {packed}, by {found.library}")
+    table = Table("channel", "message", "rows", "rate", "from (GPS time)", "span", "gaps", "sha256")
+    for channel in found.channels:
+        start, end = channel.valid_span_ns
+        rows = channel.digest.message_count
+        table.add_row(
+            channel.topic,
+            channel.schema,
+            f"{rows:,}",
+            f"{channel.rate_hz:.2f} Hz" if channel.median_interval_ns else "",
+            time.to_text(start) if rows else "",
+            f"{(end - start) / 1e9:,.2f} s" if rows else "",
+            f"{len(channel.gaps_ns)}" if len(channel.gaps_ns) else "",
+            channel.digest.sha256[:16],
+        )
+    out.print(table)
+    for channel in found.channels:
+        for start, end in channel.gaps_ns[:_SHOWN_GAPS]:
+            out.print(
+                f"gap: {channel.topic}, {time.to_text(int(start))}, {(end - start) / 1e9:.3f} s"
+            )
+        if len(channel.gaps_ns) > _SHOWN_GAPS:
+            out.print(f"     and {len(channel.gaps_ns) - _SHOWN_GAPS} more in {channel.topic}")
+        if channel.backward:
+            out.print(f"backward: {channel.topic}, {channel.backward} valid times")
+        if channel.duplicates:
+            out.print(f"duplicates: {channel.topic}, {channel.duplicates} rows")
+        for field, count in channel.not_finite.items():
+            out.print(f"not finite: {channel.topic}, {field}, {count} rows")
+        if channel.undecodable:
+            out.print(f"not decoded: {channel.topic}, {channel.undecodable}")
+    out.print("metadata: " + (", ".join(sorted(found.metadata)) or "none"))
+    for name, media_type, size in found.attachments:
+        out.print(f"attachment: {name}, {media_type}, {size:,} bytes")
+    for loss in found.report.losses:
+        err.print(f"damaged: {loss}")
+    leave(found.report.exit_code)
+
+
+@app.command()
+def doctor(log: Annotated[Path, typer.Argument(help="Log to look at.")]) -> None:
+    """Say what is damaged in a log and where."""
+    from replay import time
+    from replay.log.recover import diagnose
+
+    found = diagnose(log)
+    count = sum(found.message_counts.values())
+    span = (
+        f", {time.to_text(found.start_ns)} to {time.to_text(found.end_ns)} GPS time"
+        if count
+        else ""
+    )
+    out.print(f"{found.path}: {found.file_bytes:,} bytes, {count:,} readable messages{span}")
+    for loss in found.report.losses:
+        out.print(f"[red]damaged[/]: {loss}")
+    for note in found.notes:
+        out.print(f"note: {note}")
+    if found.report:
+        out.print(f"mend: replay recover {log} -o RECOVERED.mcap")
+    else:
+        out.print("[green]whole[/]")
+    leave(found.exit_code)
+
+
+@app.command()
+def recover(
+    log: Annotated[Path, typer.Argument(help="Damaged log.")],
+    output: Output,
+) -> None:
+    """Write what is whole of a damaged log to a new one."""
+    from replay.log.reader import LogReader
+    from replay.log.recover import recover as save
+
+    report = save(log, output)
+    with LogReader(output) as reader:
+        count = sum(info.message_count for info in reader.channels.values())
+    out.print(f"{output}: {count:,} messages came back")
+    for loss in report.losses:
+        err.print(f"lost: {loss}")
+    leave(report.exit_code)

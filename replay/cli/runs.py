@@ -1,0 +1,190 @@
+"""Commands that run things: run, verify, pipelines, degrade, simulate, baseline, warmup."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from replay.cli.app import app, err, leave, out
+from replay.cli.arguments import parse_outage, parse_time
+from replay.errors import ExitCode, UsageError
+
+Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+ShowProgress = Annotated[
+    bool | None, typer.Option("--progress/--no-progress", help="Default: on a terminal only.")
+]
+
+
+@contextmanager
+def progress_bar(words: str, show: bool | None) -> Iterator[typer.models.AnyType]:
+    """A bar on the error stream; the value is told the fraction done."""
+    visible = err.is_terminal if show is None else show
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=err, disable=not visible) as bar:
+        task = bar.add_task(words, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+@app.command()
+def run(
+    pipeline: Annotated[str, typer.Argument(help="Name; `replay pipelines` lists them.")],
+    log: Annotated[Path, typer.Argument(help="Log to run over.")],
+    output: Output,
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording too.")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="section.key=value, with units: '5 deg/h'.")
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="TOML file of settings.")] = None,
+    start: Annotated[str | None, typer.Option("--from", help="Log time to begin at.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Log time to end before.")] = None,
+    checkpoint_every: Annotated[int, typer.Option(help="Seconds of log time; 0 for none.")] = 0,
+    resume: Annotated[
+        Path | None, typer.Option(help="Earlier log of this run, to go on from its checkpoint.")
+    ] = None,
+    progress: ShowProgress = None,
+) -> None:
+    """Run a pipeline over a log and write everything it says to a new log."""
+    from replay.configuration import parse_assignments
+    from replay.engine.job import make_job
+    from replay.engine.run import replay_log
+    from replay.log.reader import LogReader
+
+    if checkpoint_every < 0:
+        raise UsageError("--checkpoint-every is a number of seconds, 0 or more")
+    tables = []
+    if config is not None:
+        try:
+            tables.append(tomllib.loads(config.read_text()))
+        except tomllib.TOMLDecodeError as error:
+            raise UsageError(f"not TOML: {error}", where=str(config)) from error
+    tables.append(parse_assignments(settings or []))
+    with LogReader(log) as reader:
+        job = make_job(
+            reader,
+            pipeline,
+            tables=tables,
+            start_ns=None if start is None else parse_time(start, reader.start_ns),
+            end_ns=None if end is None else parse_time(end, reader.start_ns),
+            checkpoint_every_s=checkpoint_every,
+        )
+        with progress_bar(f"{pipeline}", progress) as told:
+            result = replay_log(reader, output, job, resume=resume, progress=told)
+    table = Table("channel", "rows", "sha256", title=f"{output}", title_justify="left")
+    for topic, digest in result.outputs.items():
+        table.add_row(topic, f"{digest.message_count:,}", digest.sha256[:16])
+    out.print(table)
+    if result.first_ns >= 0:
+        out.print(f"{(result.last_ns - result.first_ns) / 1e9:,.1f} s of log")
+    for note in result.notes:
+        err.print(f"note: {note}")
+    if rrd is not None:
+        from replay.view.recording import write_recording
+
+        write_recording(output, rrd)
+        out.print(f"recording: {rrd}")
+    leave(result.losses.exit_code)
+
+
+@app.command()
+def verify(
+    log: Annotated[Path, typer.Argument(help="Log of a run.")],
+    source: Annotated[Path, typer.Option("--input", help="Log that the run was made from.")],
+    progress: ShowProgress = None,
+) -> None:
+    """Run a recorded run again and compare every output channel, bit for bit."""
+    from replay.engine.run import verify_run
+
+    with progress_bar("verify", progress) as told:
+        verification = verify_run(log, source, progress=told)
+    table = Table("channel", "recorded", "run again", "")
+    for channel in verification.channels:
+        word = "[green]equal[/]" if channel.equal else "[bold red]different[/]"
+        table.add_row(channel.topic, channel.recorded[:16], channel.found[:16], word)
+    out.print(table)
+    if verification.exit_code is not ExitCode.OK:
+        out.print("`replay diff` of both runs shows where they part")
+    leave(verification.exit_code)
+
+
+@app.command()
+def pipelines(
+    name: Annotated[str | None, typer.Argument(help="One pipeline, with its settings.")] = None,
+) -> None:
+    """List the pipelines, or the settings of one."""
+    from replay.configuration import describe
+    from replay.engine.pipelines import PIPELINES, find_pipeline
+
+    if name is None:
+        table = Table("pipeline", "what it does")
+        for pipeline in PIPELINES.values():
+            table.add_row(pipeline.name, pipeline.about)
+        out.print(table)
+        return
+    found = find_pipeline(name)
+    table = Table("setting", "default", "unit", "meaning", title=found.about)
+    for row in describe(found.config):
+        table.add_row(*row)
+    out.print(table)
+
+
+@app.command()
+def degrade(
+    log: Annotated[Path, typer.Argument(help="Log to change.")],
+    output: Output,
+    outage: Annotated[
+        list[str], typer.Option(help="T0,DT: from T0 for DT seconds no GNSS; may be repeated.")
+    ],
+    every: Annotated[
+        float, typer.Option(help="Repeat each outage every so many seconds; 0 for once.")
+    ] = 0.0,
+    leave_last: Annotated[
+        float, typer.Option(help="With --every: seconds at the end that stay whole.")
+    ] = 30.0,
+) -> None:
+    """Write a log without GNSS for some stretches of time."""
+    from replay.engine.degrade import Outage, remove_fixes
+    from replay.log.reader import LogReader
+
+    with LogReader(log) as reader:
+        first_ns, last_ns = reader.start_ns, reader.end_ns
+    outages: list[Outage] = []
+    for text in outage:
+        start_ns, end_ns = parse_outage(text, first_ns)
+        outages.append(Outage(start_ns, end_ns))
+        period_ns = round(every * 1e9)
+        while period_ns > 0:
+            start_ns, end_ns = start_ns + period_ns, end_ns + period_ns
+            if end_ns > last_ns - round(leave_last * 1e9):
+                break
+            outages.append(Outage(start_ns, end_ns))
+    removed = remove_fixes(log, output, outages)
+    for topic, count in removed.items():
+        out.print(f"{topic}: {count:,} rows left out in {len(outages)} outages")
+
+
+@app.command()
+def simulate(
+    scenario: Annotated[Path, typer.Argument(help="TOML file that describes the drive.")],
+    output: Output,
+) -> None:
+    """Make a log of a simulated drive with its truth."""
+    from replay.simulate import simulate as make
+
+    result = make(scenario, output)
+    for topic, digest in result.outputs.items():
+        out.print(f"{topic}: {digest.message_count:,} rows, sha256 {digest.sha256[:16]}")
+
+
+@app.command()
+def warmup() -> None:
+    """Compile every kernel now, so that the next command starts fast."""
+    from replay.engine.warmup import compile_kernels
+
+    out.print(f"compiled kernels in {compile_kernels():.1f} s")
