@@ -75,7 +75,7 @@ def _catalog(serialized: bytes) -> str:
                 match = NOTE.search(notes.get((4, message_index, 2, field_index), ""))
                 name = f"{file.package}.{message.name}.{field.name}"
                 if match:
-                    lines.append(f'    "{name}": "{match["note"]}",')
+                    lines.append(f"    {name!r}: {match['note']!r},")
                 elif field.type != FieldDescriptorProto.TYPE_MESSAGE:
                     missing.append(name)
     if missing:
