@@ -21,6 +21,16 @@ out = Console()
 err = Console(stderr=True)
 
 
+def say(text: str) -> None:
+    """Print a line that the terminal wraps, not this program: paths stay whole."""
+    out.print(text, soft_wrap=True)
+
+
+def warn(text: str) -> None:
+    """Print such a line on the error stream."""
+    err.print(text, soft_wrap=True)
+
+
 def leave(code: ExitCode) -> None:
     """End the command with an exit code other than 0."""
     if code is not ExitCode.OK:

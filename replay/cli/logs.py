@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from replay.cli.app import app, err, leave, out
+from replay.cli.app import app, leave, out, say, warn
 from replay.cli.runs import Output
 
 _SHOWN_GAPS = 3
@@ -19,19 +19,31 @@ def import_(
     spec: Annotated[Path, typer.Argument(help="TOML file: files, columns, units, axes, times.")],
     data: Annotated[Path, typer.Option(help="Folder of the files.")],
     output: Output,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Stop at the first row that would be skipped.")
+    ] = False,
+    update_expected: Annotated[
+        bool, typer.Option("--update-expected", help="Write the digests found into the spec.")
+    ] = False,
 ) -> None:
     """Make a log from files as a spec describes them."""
     from replay.importers import import_log
+    from replay.importers import update_expected as save
 
-    result = import_log(spec, data, output)
+    result = import_log(spec, data, output, strict=strict)
     table = Table("channel", "rows", "sha256", title=str(output), title_justify="left")
-    for topic, digest in result.outputs.items():
+    for topic, digest in result.digests.items():
         table.add_row(topic, f"{digest.message_count:,}", digest.sha256[:16])
     out.print(table)
     for note in result.notes:
-        out.print(f"note: {note}")
+        say(f"note: {note}")
     for loss in result.losses.losses:
-        err.print(f"skipped: {loss}")
+        warn(f"skipped: {loss}")
+    for mismatch in result.mismatches:
+        warn(f"[bold red]not as expected[/]: {mismatch}")
+    if update_expected and result.mismatches:
+        save(spec, result)
+        warn(f"{spec}: expected digests updated")
     leave(result.exit_code)
 
 
@@ -43,10 +55,10 @@ def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
 
     found = describe(log)
     packed = ", ".join(
-        f"{name or 'not compressed'} {stats.packed_bytes / max(1, stats.plain_bytes):.0%}"
+        f"{name or 'not compressed'} {stats.compressed_bytes / max(1, stats.uncompressed_bytes):.0%}"
         for name, stats in found.compression.items()
     )
-    out.print(f"{found.path}: {found.file_bytes / 1e6:,.1f} MB, {packed}, by {found.library}")
+    say(f"{found.path}: {found.file_bytes / 1e6:,.1f} MB, {packed}, by {found.library}")
     table = Table("channel", "message", "rows", "rate", "from (GPS time)", "span", "gaps", "sha256")
     for channel in found.channels:
         start, end = channel.valid_span_ns
@@ -64,24 +76,24 @@ def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
     out.print(table)
     for channel in found.channels:
         for start, end in channel.gaps_ns[:_SHOWN_GAPS]:
-            out.print(
+            say(
                 f"gap: {channel.topic}, {time.to_text(int(start))}, {(end - start) / 1e9:.3f} s"
             )
         if len(channel.gaps_ns) > _SHOWN_GAPS:
-            out.print(f"     and {len(channel.gaps_ns) - _SHOWN_GAPS} more in {channel.topic}")
+            say(f"     and {len(channel.gaps_ns) - _SHOWN_GAPS} more in {channel.topic}")
         if channel.backward:
-            out.print(f"backward: {channel.topic}, {channel.backward} valid times")
+            say(f"backward: {channel.topic}, {channel.backward} valid times")
         if channel.duplicates:
-            out.print(f"duplicates: {channel.topic}, {channel.duplicates} rows")
+            say(f"duplicates: {channel.topic}, {channel.duplicates} rows")
         for field, count in channel.not_finite.items():
-            out.print(f"not finite: {channel.topic}, {field}, {count} rows")
+            say(f"not finite: {channel.topic}, {field}, {count} rows")
         if channel.undecodable:
-            out.print(f"not decoded: {channel.topic}, {channel.undecodable}")
-    out.print("metadata: " + (", ".join(sorted(found.metadata)) or "none"))
+            say(f"not decoded: {channel.topic}, {channel.undecodable}")
+    say("metadata: " + (", ".join(sorted(found.metadata)) or "none"))
     for name, media_type, size in found.attachments:
-        out.print(f"attachment: {name}, {media_type}, {size:,} bytes")
+        say(f"attachment: {name}, {media_type}, {size:,} bytes")
     for loss in found.report.losses:
-        err.print(f"damaged: {loss}")
+        warn(f"damaged: {loss}")
     leave(found.report.exit_code)
 
 
@@ -98,15 +110,15 @@ def doctor(log: Annotated[Path, typer.Argument(help="Log to look at.")]) -> None
         if count
         else ""
     )
-    out.print(f"{found.path}: {found.file_bytes:,} bytes, {count:,} readable messages{span}")
+    say(f"{found.path}: {found.file_bytes:,} bytes, {count:,} readable messages{span}")
     for loss in found.report.losses:
-        out.print(f"[red]damaged[/]: {loss}")
+        say(f"[red]damaged[/]: {loss}")
     for note in found.notes:
-        out.print(f"note: {note}")
+        say(f"note: {note}")
     if found.report:
-        out.print(f"mend: replay recover {log} -o RECOVERED.mcap")
+        say(f"mend: replay recover {log} -o RECOVERED.mcap")
     else:
-        out.print("[green]whole[/]")
+        say("[green]whole[/]")
     leave(found.exit_code)
 
 
@@ -122,7 +134,7 @@ def recover(
     report = save(log, output)
     with LogReader(output) as reader:
         count = sum(info.message_count for info in reader.channels.values())
-    out.print(f"{output}: {count:,} messages came back")
+    say(f"{output}: {count:,} messages came back")
     for loss in report.losses:
-        err.print(f"lost: {loss}")
+        warn(f"lost: {loss}")
     leave(report.exit_code)

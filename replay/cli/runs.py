@@ -12,7 +12,7 @@ import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from replay.cli.app import app, err, leave, out
+from replay.cli.app import app, err, leave, out, say, warn
 from replay.cli.arguments import parse_outage, parse_time
 from replay.errors import ExitCode, UsageError
 
@@ -81,14 +81,14 @@ def run(
         table.add_row(topic, f"{digest.message_count:,}", digest.sha256[:16])
     out.print(table)
     if result.first_ns >= 0:
-        out.print(f"{(result.last_ns - result.first_ns) / 1e9:,.1f} s of log")
+        say(f"{(result.last_ns - result.first_ns) / 1e9:,.1f} s of log")
     for note in result.notes:
-        err.print(f"note: {note}")
+        warn(f"note: {note}")
     if rrd is not None:
         from replay.view.recording import write_recording
 
         write_recording(output, rrd)
-        out.print(f"recording: {rrd}")
+        say(f"recording: {rrd}")
     leave(result.losses.exit_code)
 
 
@@ -109,7 +109,7 @@ def verify(
         table.add_row(channel.topic, channel.recorded[:16], channel.found[:16], word)
     out.print(table)
     if verification.exit_code is not ExitCode.OK:
-        out.print("`replay diff` of both runs shows where they part")
+        say("`replay diff` of both runs shows where they part")
     leave(verification.exit_code)
 
 
@@ -166,7 +166,7 @@ def degrade(
             outages.append(Outage(start_ns, end_ns))
     removed = remove_fixes(log, output, outages)
     for topic, count in removed.items():
-        out.print(f"{topic}: {count:,} rows left out in {len(outages)} outages")
+        say(f"{topic}: {count:,} rows left out in {len(outages)} outages")
 
 
 @app.command()
@@ -179,7 +179,7 @@ def simulate(
 
     result = make(scenario, output)
     for topic, digest in result.outputs.items():
-        out.print(f"{topic}: {digest.message_count:,} rows, sha256 {digest.sha256[:16]}")
+        say(f"{topic}: {digest.message_count:,} rows, sha256 {digest.sha256[:16]}")
 
 
 @app.command()
@@ -187,4 +187,4 @@ def warmup() -> None:
     """Compile every kernel now, so that the next command starts fast."""
     from replay.engine.warmup import compile_kernels
 
-    out.print(f"compiled kernels in {compile_kernels():.1f} s")
+    say(f"compiled kernels in {compile_kernels():.1f} s")

@@ -14,7 +14,8 @@ scale            columns                                    also
 ================ ========================================== ===========================
 
 `offset` is added to what was read: valid time = time read + offset, so a sensor
-that is stamped too late has a negative one.
+that is stamped too late has a negative one. `repeats` and `steady` are for polled
+sensors: see :mod:`replay.importers.poll`.
 """
 
 from __future__ import annotations

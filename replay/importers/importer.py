@@ -19,6 +19,7 @@ from replay.importers.files import File, read_file
 from replay.importers.findings import Findings
 from replay.importers.messages import Rows, build_rows
 from replay.importers.ordering import join_tables, order_rows
+from replay.importers.poll import repeats, steady_times
 from replay.importers.result import ImportResult, compare_digests
 from replay.importers.rtklib_pos import read_pos
 from replay.importers.rtklib_tag import Tag, read_tag
@@ -129,7 +130,22 @@ class _Import:
         place = (table.file.name, channel.topic)
         order = kept[order_rows(times[kept], table.lines[kept], *place, self.findings)]
         self.progress(f"{name}: {len(order)} of {len(table)} rows for {channel.topic}")
+        if channel.time.repeats == "drop":
+            repeated = repeats(rows.values, order)
+            self._note_once(
+                f"{channel.topic}: {int(repeated.sum())} of {len(order)} rows repeat the "
+                "reading before them and are left out, as the spec says"
+            )
+            order = order[~repeated]
         valid = times[order]
+        if channel.time.steady > 0.0:
+            steady = steady_times(valid, channel.time.steady)
+            moved = float(np.abs(steady - valid).max()) / time.NS_PER_S
+            self._note_once(
+                f"{channel.topic}: times follow the sensor's own clock (time constant "
+                f"{channel.time.steady:g} s), by up to {moved:.4f} s"
+            )
+            valid = steady
         return Columns.build(
             valid,
             {field: np.ascontiguousarray(column[order]) for field, column in rows.values.items()},

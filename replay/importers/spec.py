@@ -82,6 +82,8 @@ class Time(Section, frozen=True):
     fit: Literal["linear", "span"] = "linear"
     offset: Annotated[float, quantity("s", "valid time = time read + offset")] = 0.0
     latency: Annotated[float, quantity("s", "log time = valid time + latency")] = 0.0
+    repeats: Literal["keep", "drop"] = "keep"
+    steady: Annotated[float, quantity("s", "time constant of a polled sensor's clock")] = 0.0
 
 
 class Absence(Section, frozen=True):

@@ -1,0 +1,163 @@
+"""Errors of a solution, solution minus truth, in local axes at the truth.
+
+A solution is about the IMU's origin, truth about a point at its own lever arm. The
+solution is moved there with its own attitude and turn rate, because that is what its
+user would do.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from replay.evaluate.align import Aligned, Rows, align, known_rows, truth_positions
+from replay.evaluate.geometry import Floats, body_to_enu, enu_axes, turn, turn_back, wrapped
+from replay.log.columns import Columns
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Errors:
+    """Solution minus truth where both are known.
+
+    Attributes
+    ----------
+    rows : int64 array (m,)
+        Rows of the solution that the errors belong to.
+    times_ns : int64 array (m,), GPS ns
+    values : float64 array (m, 3)
+        Components and unit after the function.
+    """
+
+    rows: Rows
+    times_ns: Rows
+    values: Floats
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def take(self, keep: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Errors:
+        """Some of the errors, by a mask (m,)."""
+        return Errors(self.rows[keep], self.times_ns[keep], self.values[keep])
+
+
+def position_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
+    """Position errors at the truth's point.
+
+    Parameters
+    ----------
+    solution : Columns of replay.Solution
+    truth : Columns of replay.Truth
+    fixed_only : bool
+        Use rows of truth with fixed ambiguities only.
+
+    Returns
+    -------
+    Errors
+        East, north, up [m].
+    """
+    known = known_rows(truth, "position_ecef_m", fixed_only=fixed_only)
+    aligned = align(solution.valid_time_ns, known.valid_time_ns)
+    reference = truth_positions(aligned, known)
+    origin = solution["position_ecef_m"][aligned.rows].astype(np.float64)
+    arm_enu = turn(_attitudes(solution, aligned), _lever_arms(aligned, known))
+    point = origin + turn_back(enu_axes(origin), arm_enu)
+    return _finite(solution, aligned, turn(enu_axes(reference), point - reference))
+
+
+def velocity_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
+    """Velocity errors at the truth's point; truth is interpolated on straight lines.
+
+    Parameters
+    ----------
+    solution, truth, fixed_only
+        As in :func:`position_errors`.
+
+    Returns
+    -------
+    Errors
+        East, north, up [m/s]; none where truth has no velocity.
+    """
+    known = known_rows(truth, "velocity_enu_m_s", fixed_only=fixed_only)
+    aligned = align(solution.valid_time_ns, known.valid_time_ns)
+    if len(aligned.rows) == 0:
+        return _none()
+    rate = solution["angular_rate_body_rad_s"][aligned.rows].astype(np.float64)
+    swing = np.cross(rate, _lever_arms(aligned, known))
+    velocity = solution["velocity_enu_m_s"][aligned.rows].astype(np.float64) + turn(
+        _attitudes(solution, aligned), swing
+    )
+    reference = aligned.linear(known["velocity_enu_m_s"].astype(np.float64))
+    return _finite(solution, aligned, velocity - reference)
+
+
+def attitude_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
+    """Differences of roll, pitch and heading; truth is interpolated on straight lines.
+
+    Parameters
+    ----------
+    solution, truth, fixed_only
+        As in :func:`position_errors`.
+
+    Returns
+    -------
+    Errors
+        Roll, pitch, heading [rad] in [-pi, pi); none where truth has no attitude.
+    """
+    known = known_rows(truth, "attitude_rad", fixed_only=fixed_only)
+    aligned = align(solution.valid_time_ns, known.valid_time_ns)
+    if len(aligned.rows) == 0:
+        return _none()
+    reference = aligned.angles(known["attitude_rad"].astype(np.float64))
+    found = solution["attitude_rad"][aligned.rows].astype(np.float64)
+    return _finite(solution, aligned, wrapped(found - reference))
+
+
+def rotation_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
+    """Attitude errors as rotation vectors from truth to solution.
+
+    These, not differences of Euler angles, are what the solution's attitude deviations
+    are about.
+
+    Parameters
+    ----------
+    solution, truth, fixed_only
+        As in :func:`position_errors`.
+
+    Returns
+    -------
+    Errors
+        About east, north, up [rad]; none where truth has no attitude.
+    """
+    known = known_rows(truth, "attitude_rad", fixed_only=fixed_only)
+    aligned = align(solution.valid_time_ns, known.valid_time_ns)
+    if len(aligned.rows) == 0:
+        return _none()
+    reference = body_to_enu(aligned.angles(known["attitude_rad"].astype(np.float64)))
+    found = _attitudes(solution, aligned)
+    finite = np.isfinite(found).all(axis=(1, 2))
+    vectors = np.full((len(found), 3), np.nan)
+    difference = np.einsum("nij,nkj->nik", found[finite], reference[finite])
+    if finite.any():
+        vectors[finite] = Rotation.from_matrix(difference).as_rotvec()
+    return _finite(solution, aligned, vectors)
+
+
+def _attitudes(solution: Columns, aligned: Aligned) -> Floats:
+    return body_to_enu(solution["attitude_rad"][aligned.rows].astype(np.float64))
+
+
+def _lever_arms(aligned: Aligned, truth: Columns) -> Floats:
+    return aligned.linear(truth["lever_arm_body_m"].astype(np.float64))
+
+
+def _finite(solution: Columns, aligned: Aligned, values: Floats) -> Errors:
+    keep = np.isfinite(values).all(axis=1)
+    rows = aligned.rows[keep]
+    return Errors(rows, solution.valid_time_ns[rows], values[keep])
+
+
+def _none() -> Errors:
+    none = np.empty(0, dtype=np.int64)
+    return Errors(none, none, np.empty((0, 3)))

@@ -1,0 +1,129 @@
+"""Filter settings that fit a simulated log, so that a run over it needs none.
+
+What an importer knows of its instrument, the simulator knows of its own: noise is
+taken as it was made, and what holds for alignment and stops follows from it. Only
+what follows from the scenario is said; the rest is left to the pipeline.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from replay.configuration import STANDARD_GRAVITY_M_S2, Table, literal
+from replay.simulate.scenario import Settings
+
+# What is left to a perfect unit: a filter needs some noise, and integration has its own.
+_LEAST_GYRO_NOISE: Final = 1e-7  # rad/sqrt(s)
+_LEAST_ACCEL_NOISE: Final = 1e-6  # m/s/sqrt(s)
+_LEAST_GYRO_BIAS: Final = 1e-7  # rad/s
+_LEAST_ACCEL_BIAS: Final = 1e-4  # m/s^2
+_LEAST_TILT: Final = 1e-4  # rad
+_LEAST_REST: Final = 1e-3  # m/s^2: rest ends before the detector sees that it does
+
+_REST_TIME_S: Final = 5.0
+_BLOCK_S: Final = 0.1
+_INTERVAL_S: Final = 0.25
+_SPREAD: Final = 5.0  # deviations of a block's mean; sixty of them are looked at
+_LEAST_ACCEL_SPREAD: Final = 0.01  # m/s^2
+_LEAST_GYRO_SPREAD: Final = 5e-4  # rad/s
+_LEAST_STOP_RATE: Final = 1e-3  # rad/s
+_STOP_SPEED: Final = 0.3  # m/s: simulated braking is as smooth as rest, but for its last metre
+_COURSE_SPEED: Final = 3.0  # m/s
+_LEAST_HEADING: Final = 0.01  # rad: a course is the heading but for the body's lean
+_SLIP: Final = 0.02  # m/s
+_BRAKING_M_S: Final = 15.0  # at 1 m/s^2 from this speed the lean shows as so much slip
+
+
+def fitting_defaults(settings: Settings) -> Table:
+    """Sections of a pipeline's configuration for a scenario's sensors and vehicle."""
+    errors = settings.imu.errors
+    receiver = settings.gnss.errors
+    gyro_noise = max(errors.gyro_noise, _LEAST_GYRO_NOISE)
+    accel_noise = max(errors.accel_noise, _LEAST_ACCEL_NOISE)
+    gyro_sigma, gyro_tau = _one_process(errors.gyro_bias, errors.gyro_drift, errors.gyro_drift_tau)
+    accel_sigma, accel_tau = _one_process(
+        errors.accel_bias, errors.accel_drift, errors.accel_drift_tau
+    )
+    accel_sigma = max(accel_sigma, _LEAST_ACCEL_BIAS)
+    scaled = errors.gyro_scale > 0.0 or errors.accel_scale > 0.0
+    gyro_at_rest = _root_sum_square(gyro_noise / math.sqrt(_REST_TIME_S), errors.gyro_drift)
+    accel_at_rest = _root_sum_square(accel_noise / math.sqrt(_REST_TIME_S), errors.accel_drift)
+    lean = settings.vehicle.pitch_per_g / STANDARD_GRAVITY_M_S2
+    return {
+        "filter": {
+            "states": 21 if scaled else 15,
+            "gyro_noise": _three(gyro_noise),
+            "accel_noise": _three(accel_noise),
+            "gyro_bias_sigma": _three(max(gyro_sigma, _LEAST_GYRO_BIAS)),
+            "gyro_bias_tau": gyro_tau,
+            "accel_bias_sigma": _three(accel_sigma),
+            "accel_bias_tau": accel_tau,
+            "gyro_scale_sigma": _three(errors.gyro_scale),
+            "accel_scale_sigma": _three(errors.accel_scale),
+        },
+        "alignment": {
+            "rest_time": _REST_TIME_S,
+            "rest_sigma": max(accel_at_rest, _LEAST_REST),
+            "course_speed": _COURSE_SPEED,
+            "tilt_sigma": max(accel_sigma / STANDARD_GRAVITY_M_S2, _LEAST_TILT),
+            "heading_sigma": _root_sum_square(
+                receiver.horizontal_velocity_noise / _COURSE_SPEED, _LEAST_HEADING
+            ),
+            "velocity_sigma": max(receiver.vertical_velocity_noise, 0.02),
+            "gyro_bias_sigma": _three(max(2.0 * gyro_at_rest, _LEAST_GYRO_BIAS)),
+            "accel_bias_sigma": _three(accel_sigma),
+        },
+        "gnss": {"latency": settings.gnss.latency},
+        "stops": {
+            "zero_velocity": True,
+            "zero_rate": True,
+            "block": _BLOCK_S,
+            "interval": _INTERVAL_S,
+            "accel_spread": max(_SPREAD * accel_noise / math.sqrt(_BLOCK_S), _LEAST_ACCEL_SPREAD),
+            "gyro_spread": max(_SPREAD * gyro_noise / math.sqrt(_BLOCK_S), _LEAST_GYRO_SPREAD),
+            "rate": max(_SPREAD * gyro_at_rest, _LEAST_STOP_RATE),
+            "speed": _STOP_SPEED,
+            "velocity_sigma": 0.01,
+            # The update takes the mean over the time since the last one.
+            "rate_sigma": _three(gyro_noise / math.sqrt(_INTERVAL_S)),
+        },
+        "non_holonomic": {
+            "enabled": True,
+            "right_sigma": _SLIP,
+            "down_sigma": _SLIP + _BRAKING_M_S * lean,
+            "lever_arm": _three(0.0),  # the IMU is the point that moves along the road
+            "estimate_lever_arm": False,
+            "mounting": False,
+        },
+    }
+
+
+def defaults_toml(settings: Settings) -> str:
+    """Canonical TOML of :func:`fitting_defaults`."""
+    sections = []
+    for name, table in fitting_defaults(settings).items():
+        lines = [f"{key} = {literal(value)}" for key, value in table.items()]
+        sections.append("\n".join([f"[{name}]", *lines]) + "\n")
+    return "\n".join(sections)
+
+
+def _three(value: float) -> tuple[float, float, float]:
+    return value, value, value
+
+
+def _root_sum_square(a: float, b: float) -> float:
+    """Length of (a, b); `math.hypot` does not promise the same bits everywhere."""
+    return math.sqrt(a * a + b * b)
+
+
+def _one_process(bias: float, drift: float, tau_s: float) -> tuple[float, float]:
+    """Deviation and correlation time of one process for a constant and a drifting part.
+
+    The deviation is that of the sum; the noise that drives it, 2 sigma^2 / tau, is that
+    of the drift. A correlation time of 0 is a constant.
+    """
+    variance = bias * bias + drift * drift
+    if drift == 0.0:
+        return math.sqrt(variance), 0.0
+    return math.sqrt(variance), tau_s * variance / (drift * drift)

@@ -1,0 +1,291 @@
+"""A run log as one HTML page that loads nothing: for reading, mailing and printing.
+
+The figures are the panels of the recording, drawn once as SVG. The same log and
+evaluation give the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, Final
+
+from replay.errors import ReplayError
+from replay.schemas import replay_pb2
+from replay.time import seconds_between, to_text
+from replay.view import key_figures
+from replay.view.about import manifest_of
+from replay.view.charts import Clock, panels_chart
+from replay.view.events import Event, events_of
+from replay.view.gather import Batches, RunData, gather
+from replay.view.histogram_chart import histogram_chart
+from replay.view.imu_envelope import ImuEnvelope
+from replay.view.labels import BOUNDS, NONE
+from replay.view.markup import Table, figure, page, section, tiles
+from replay.view.panels import Panel, Section
+from replay.view.plan_chart import plan_chart
+from replay.view.recording import all_panels
+from replay.view.source import open_run
+
+_MOST_EVENTS: Final = 200
+_STACKED: Final = {
+    Section.POSITION_ERROR: f"Solution minus truth at the truth's point, with {BOUNDS}.",
+    Section.POSITION_SIGMA: "There is no truth: the standard deviations that the filter states.",
+    Section.VELOCITY_ERROR: f"Solution minus truth, with {BOUNDS} of the solution.",
+    Section.ATTITUDE_ERROR: f"Solution minus truth, wrapped, with {BOUNDS} of the solution.",
+}
+_GROUPS: Final = (
+    (
+        "Velocity and attitude",
+        (Section.VELOCITY, Section.ATTITUDE),
+        "Velocity in local east, north, up; roll, pitch and heading from true north.",
+    ),
+    (
+        "Sensor errors",
+        (
+            Section.GYRO_BIAS,
+            Section.ACCEL_BIAS,
+            Section.GYRO_SCALE,
+            Section.ACCEL_SCALE,
+            Section.MOUNTING,
+            Section.NON_SLIP,
+        ),
+        f"Estimates with {BOUNDS} of the filter, in body axes.",
+    ),
+    (
+        "Innovations",
+        (Section.INNOVATIONS,),
+        f"Measurement minus prediction, with {BOUNDS}; crosses were rejected.",
+    ),
+    ("GNSS", (Section.GNSS,), "What the receivers state."),
+    ("Inertial samples", (Section.IMU,), "Least and greatest sample of each second."),
+)
+
+
+def write_report(
+    run_log: Path,
+    out_html: Path,
+    *,
+    evaluation: Mapping[str, Any] | None = None,
+    title: str | None = None,
+) -> None:
+    """Write the report of a run log.
+
+    Parameters
+    ----------
+    run_log : Path
+        MCAP log of a run; channels that it lacks are left out.
+    out_html : Path
+        Replaced once the page is whole.
+    evaluation : mapping or None
+        Figures of the run against truth, or one such mapping per run of the log; shown as far
+        as they are there.
+    title : str or None
+        Heading; None takes the log's name.
+
+    Raises
+    ------
+    LogError
+        Where the log cannot be read.
+    """
+    with open_run(run_log) as source:
+        text = report_html(
+            source.batches(),
+            source.metadata,
+            evaluation=evaluation,
+            title=title or run_log.stem,
+        )
+    part = out_html.with_name(out_html.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, out_html)
+    except OSError as error:
+        raise ReplayError(
+            f"the report cannot be written: {error.strerror or error}",
+            where=str(out_html),
+            mend="choose a folder that exists and has room",
+        ) from error
+
+
+def report_html(
+    batches: Batches,
+    metadata: Mapping[str, Mapping[str, str]],
+    *,
+    evaluation: Mapping[str, Any] | None = None,
+    title: str,
+) -> str:
+    """The report as text; see :func:`write_report`."""
+    envelope = ImuEnvelope()
+    data = gather(batches, metadata, on_imu=envelope)
+    panels = [*all_panels(data), *envelope.panels()]
+    manifest = manifest_of(metadata)
+    parts = [
+        _header(data, manifest, title),
+        _figures_section(data, evaluation or {}),
+        _trajectory_section(data),
+        *_panel_sections(data, panels),
+        _events_section(data),
+        _channels_section(data, manifest),
+        _run_section(manifest),
+    ]
+    return page(title, "\n".join(part for part in parts if part))
+
+
+def _header(data: RunData, manifest: replay_pb2.Manifest | None, title: str) -> str:
+    lines = []
+    if data.span_ns is not None:
+        start, end = data.span_ns
+        elapsed = float(seconds_between(end, start))
+        lines.append(f"{to_text(start)} to {to_text(end)} GPS time, {elapsed:.1f} s")
+    if data.runs:
+        lines.append("runs: " + ", ".join(run.name for run in data.runs))
+    if manifest is not None:
+        lines.append(f"pipeline {manifest.pipeline}, version {manifest.package_version}")
+    return f"<h1>{escape(title)}</h1><p class='sub'>{escape(' · '.join(lines))}</p>"
+
+
+def _figures_section(data: RunData, evaluation: Mapping[str, Any]) -> str:
+    """One block, or one per run where the evaluation is keyed by run."""
+    names = [run.name for run in data.runs if run.name in evaluation]
+    blocks = [(name, evaluation[name]) for name in names] or [("", evaluation)]
+    parts: list[str] = []
+    for name, figures in blocks:
+        parts.append(f"<h3>{escape(name)}</h3>" if name else "")
+        parts.append(tiles(key_figures.headline(figures)))
+        parts += [table.html() for table in key_figures.tables(figures)]
+    return section("Key figures", parts)
+
+
+def _trajectory_section(data: RunData) -> str:
+    chart = plan_chart(data)
+    outages = tuple(
+        (
+            str(number),
+            to_text(outage.start_ns),
+            f"{float(seconds_between(outage.end_ns, outage.start_ns)):.1f}",
+            "cut on purpose" if outage.cut else "gap between fixes",
+        )
+        for number, outage in enumerate(data.outages, start=1)
+    )
+    table = Table(("outage", "start, GPS time", "duration [s]", "why"), outages, text_columns=4)
+    return section(
+        "Trajectory",
+        [
+            figure(chart, "Plan of the trajectory with its outages") if chart else "",
+            table.html() if outages else "",
+        ],
+    )
+
+
+def _panel_sections(data: RunData, panels: Sequence[Panel]) -> list[str]:
+    if data.span_ns is None:
+        return []
+    clock = Clock(*data.span_ns)
+    parts = []
+    for kind, about in _STACKED.items():
+        chosen = [panel for panel in panels if panel.section is kind]
+        parts.append(section(kind.value, [_panels_figure(data, chosen, clock, about, 1)]))
+    for title, kinds, about in _GROUPS:
+        chosen = [panel for kind in kinds for panel in panels if panel.section is kind]
+        figures = [_panels_figure(data, chosen, clock, about, None)]
+        if title == "Innovations":
+            figures += _consistency_figures(data, panels, clock)
+        parts.append(section(title, figures))
+    return parts
+
+
+def _panels_figure(
+    data: RunData, panels: Sequence[Panel], clock: Clock, caption: str, columns: int | None
+) -> str:
+    if not panels:
+        return ""
+    chart = panels_chart(panels, clock, data.outages, caption=caption, columns=columns)
+    names = ", ".join(panel.heading for panel in panels)
+    return figure(chart, f"Plots over time: {names}")
+
+
+def _consistency_figures(data: RunData, panels: Sequence[Panel], clock: Clock) -> list[str]:
+    chart = histogram_chart(data)
+    nis = [panel for panel in panels if panel.section is Section.NIS]
+    about = "Sum of squares of an epoch's accepted normalised innovations over their number."
+    return [
+        figure(chart, "Histograms of normalised innovations") if chart else "",
+        _panels_figure(data, nis, clock, about, 1),
+    ]
+
+
+def _events_section(data: RunData) -> str:
+    found: list[tuple[Event, str]] = [
+        (event, run.name)
+        for run in data.runs
+        if run.events is not None
+        for event in events_of(run.events)
+    ]
+    found.sort(key=lambda item: item[0].time_ns)
+    rows = tuple(
+        (to_text(event.time_ns)[11:], run, event.level, event.text)
+        for event, run in found[:_MOST_EVENTS]
+    )
+    if not rows:
+        return ""
+    counts = Counter(event.kind for event, _ in found)
+    said = ", ".join(f"{kind} {count}" for kind, count in counts.most_common())
+    if len(found) > _MOST_EVENTS:
+        said += f". The first {_MOST_EVENTS} of {len(found)}:"
+    table = Table(("GPS time", "run", "level", "event"), rows, caption=said, text_columns=4)
+    return section("Events", [table.html()])
+
+
+def _channels_section(data: RunData, manifest: replay_pb2.Manifest | None) -> str:
+    digests = (
+        {item.topic: item for item in (*manifest.inputs, *manifest.outputs)} if manifest else {}
+    )
+    rows = tuple(
+        (
+            topic,
+            digests[topic].sha256[:16] if topic in digests else NONE,
+            str(stats.count),
+            NONE if stats.rate_hz is None else f"{stats.rate_hz:.2f}",
+            to_text(stats.first_ns)[11:],
+            to_text(stats.last_ns)[11:],
+        )
+        for topic, stats in data.stats.items()
+    )
+    head = ("topic", "SHA-256, first 16", "rows", "rate [Hz]", "first", "last")
+    return section("Channels", [Table(head, rows, text_columns=2).html()] if rows else [])
+
+
+def _run_section(manifest: replay_pb2.Manifest | None) -> str:
+    if manifest is None:
+        return section("What was run", ["<p>The log has no manifest.</p>"])
+    facts = (
+        ("command", manifest.command),
+        ("pipeline", manifest.pipeline),
+        ("package version", manifest.package_version),
+        *(("note", note) for note in manifest.notes),
+    )
+    stages = tuple(
+        (stage.name, str(stage.version), ", ".join(stage.inputs), ", ".join(stage.outputs))
+        for stage in manifest.stages
+    )
+    digests = tuple(
+        (side, item.topic, item.schema, item.sha256, str(item.message_count))
+        for side, items in (("in", manifest.inputs), ("out", manifest.outputs))
+        for item in items
+    )
+    stage_table = Table(("stage", "version", "inputs", "outputs"), stages, text_columns=4)
+    digest_head = ("", "topic", "message", "SHA-256 of the content", "messages")
+    return section(
+        "What was run",
+        [
+            Table(("what", ""), facts, text_columns=2).html(),
+            stage_table.html() if stages else "",
+            Table(digest_head, digests, text_columns=4).html() if digests else "",
+            f"<pre>{escape(manifest.configuration.strip())}</pre>"
+            if manifest.configuration
+            else "",
+        ],
+    )
