@@ -158,6 +158,7 @@ FILTER_STATE: Final = ChannelSpec(
         "accel_scale_factor": Tolerance(1e-7, "1"),
         "mounting_angles_rad": _RAD,
         "non_slip_point_body_m": _M,
+        "squat_rad_s2_m": Tolerance(1e-7, "rad/(m/s^2)"),
     },
 )
 FILTER_COVARIANCE: Final = ChannelSpec(

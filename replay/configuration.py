@@ -54,6 +54,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
         "mg/sqrt(Hz)": 1e-3 * STANDARD_GRAVITY_M_S2,
         "ug/sqrt(Hz)": 1e-6 * STANDARD_GRAVITY_M_S2,
     },
+    "rad/(m/s^2)": {"rad/(m/s^2)": 1.0, "deg/(m/s^2)": _DEG, "deg/g": _DEG / STANDARD_GRAVITY_M_S2},
     "Hz": {"Hz": 1.0, "kHz": 1e3},
 }
 

@@ -76,9 +76,7 @@ def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
     out.print(table)
     for channel in found.channels:
         for start, end in channel.gaps_ns[:_SHOWN_GAPS]:
-            say(
-                f"gap: {channel.topic}, {time.to_text(int(start))}, {(end - start) / 1e9:.3f} s"
-            )
+            say(f"gap: {channel.topic}, {time.to_text(int(start))}, {(end - start) / 1e9:.3f} s")
         if len(channel.gaps_ns) > _SHOWN_GAPS:
             say(f"     and {len(channel.gaps_ns) - _SHOWN_GAPS} more in {channel.topic}")
         if channel.backward:

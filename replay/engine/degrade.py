@@ -107,9 +107,7 @@ def _copy_metadata(
             writer.add_metadata(name, values)
     writer.add_metadata(DEGRADE, {_JSON: json.dumps(before)})
     for attachment in reader.attachments:
-        writer.add_attachment(
-            attachment.name, attachment.data, media_type=attachment.media_type
-        )
+        writer.add_attachment(attachment.name, attachment.data, media_type=attachment.media_type)
     lines = [f"[[outage]]\nstart_ns = {o.start_ns}\nend_ns = {o.end_ns}\n" for o in outages]
     manifest = make_manifest(
         command="degrade",

@@ -9,7 +9,7 @@ _CORE: Final = ("position_ecef", "velocity_ecef", "attitude_ecef", "gyro_bias", 
 _SCALES: Final = ("gyro_scale", "accel_scale")
 
 
-def state_names(states: int, *, mounting: bool, lever: bool) -> tuple[str, ...]:
+def state_names(states: int, *, mounting: bool, lever: bool, squat: bool) -> tuple[str, ...]:
     """Names of the 15 or 21 inertial error states, and of those of the vehicle.
 
     Order and meaning are those of :mod:`replay.kernels.covariance`.
@@ -20,4 +20,6 @@ def state_names(states: int, *, mounting: bool, lever: bool) -> tuple[str, ...]:
         names += ("mounting_pitch", "mounting_yaw")
     if lever:
         names += ("non_slip_point_forward", "non_slip_point_down")
+    if squat:
+        names += ("squat",)
     return names

@@ -247,6 +247,8 @@ def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
     if cfg["lever"] == 1:
         P[k, k] = _square(cfg["lever_sigma"][0])
         P[k + 1, k + 1] = _square(cfg["lever_sigma"][1])
+    if cfg["squat"] == 1:
+        P[n - 1, n - 1] = _square(cfg["squat_sigma"])
 
 
 @njit(cache=True)

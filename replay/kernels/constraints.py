@@ -140,10 +140,12 @@ def zero_rate_update(s, cfg, work, t, log_t, innovations, counts):
 def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
     """Wheels roll forward: no velocity to the right or down at a point of the vehicle.
 
-    With mounting pitch p and yaw y, small angles from vehicle to body axes, the
+    With mounting pitch p and yaw y, small angles of the vehicle relative to the body, the
     vehicle's velocity at the point is v_right = v_y - y v_x and v_down = v_z + p v_x,
     where v_b = C' v + (w_ib - w_ie) x l. Forward and down coordinates of the point can
-    be states too; it need not be the rear axle (tyres slip, suspensions lean).
+    be states too; it need not be the rear axle (tyres slip, suspensions lean). On its
+    springs a vehicle pitches with the forward specific force: the pitch p grows by
+    squat times that force.
     """
     nav = s["nav"]
     v, C = nav["v"], nav["C"]
@@ -164,7 +166,7 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
     right = cfg["nhc_right_sigma"]
     down = cfg["nhc_down_sigma"]
     diagonal(work["R"], right * right + turning * turning, down * down + turning * turning, 1.0)
-    pitch, yaw = mount[0], mount[1]
+    pitch, yaw = mount[0] + s["squat"] * s["f_smooth"][0], mount[1]
     z[0] = -(b1 - yaw * b0)
     z[1] = -(b2 + pitch * b0)
     for i in range(3):
@@ -176,7 +178,7 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
         for i in range(3):
             index[count + i] = GYRO_SCALE + i
         count += 3
-    for i in range(2 * cfg["mounting"] + 2 * cfg["lever"]):
+    for i in range(2 * cfg["mounting"] + 2 * cfg["lever"] + cfg["squat"]):
         index[count + i] = cfg["states"] + i
     for i in range(2):
         x0 = -yaw if i == 0 else pitch
@@ -207,10 +209,14 @@ def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
             # Columns of [w x] that belong to the forward and the down coordinate.
             H[i, column] = x1 * w2 - x2 * w1
             H[i, column + 1] = x0 * w1 - x1 * w0
+            column += 2
+        if cfg["squat"] == 1:
+            H[i, column] = b0 * s["f_smooth"][0] if i == 1 else 0.0
     if cfg["mounting"] == 1:
         count += 2
     if cfg["lever"] == 1:
         count += 2
+    count += cfg["squat"]
     return update(
         s, cfg, work, 2, count, cfg["nhc_gate"], False, KIND_NON_HOLONOMIC, AXIS_RIGHT, t, log_t,
         innovations, counts,

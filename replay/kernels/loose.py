@@ -62,11 +62,9 @@ def _decay_and_noise(cfg, work, dt):
         for i in range(cfg["states"], cfg["states"] + 2):
             decay[i] = 1.0
             noise[i] = cfg["mounting_noise"] * cfg["mounting_noise"] * dt
-    if cfg["lever"] == 1:
-        n = state_count(cfg)
-        for i in range(n - 2, n):
-            decay[i] = 1.0
-            noise[i] = 0.0
+    for i in range(cfg["states"] + 2 * cfg["mounting"], state_count(cfg)):
+        decay[i] = 1.0
+        noise[i] = 0.0
 
 
 @njit(cache=True)
@@ -111,10 +109,11 @@ def _advance(s, cfg, work, t):
     smooth = 1.0
     if cfg["nhc_smoothing"] > 0.0:
         smooth = 1.0 - exp(-dt / cfg["nhc_smoothing"])
-    w_smooth = s["w_smooth"]
+    w_smooth, f_smooth = s["w_smooth"], s["f_smooth"]
     for i in range(3):
         moved[i] += r[i]
         w_smooth[i] += smooth * (w[i] - w_smooth[i])
+        f_smooth[i] += smooth * (f[i] - f_smooth[i])
     decay = work["decay"]
     bg, ba, sg, sa = s["bg"], s["ba"], s["sg"], s["sa"]
     for i in range(3):
@@ -210,6 +209,7 @@ def _emit_epoch(s, cfg, log_t, rows, covariances, counts):
     row["mount"][2] = s["mount"][1]
     for i in range(3):
         row["point"][i] = s["point"][i]
+    row["squat"] = s["squat"]
     n = state_count(cfg)
     k = 0
     P = s["P"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from replay.kernels.strapdown import NAVIGATION_DTYPE
 
-MAX_STATES: Final = 25
+MAX_STATES: Final = 26
 WINDOW: Final = 512  # inertial samples that the stop detector can look back at most
 
 # How far the filter has come.
@@ -23,6 +23,7 @@ CONFIG_DTYPE: Final = np.dtype(
         ("states", "<i8"),  # 15 or 21, without those of the vehicle
         ("mounting", "<i8"),  # 1 where mounting pitch and yaw are estimated
         ("lever", "<i8"),  # 1 where the point that does not slip is estimated
+        ("squat", "<i8"),  # 1 where pitching under acceleration is estimated
         ("gyro_noise", "<f8", 3),  # rad/sqrt(s)
         ("accel_noise", "<f8", 3),  # m/s/sqrt(s)
         ("gyro_bias_sigma", "<f8", 3),  # rad/s
@@ -36,6 +37,7 @@ CONFIG_DTYPE: Final = np.dtype(
         ("mounting_sigma", "<f8"),  # rad
         ("mounting_noise", "<f8"),  # rad/sqrt(s)
         ("lever_sigma", "<f8", 2),  # m, forward and down
+        ("squat_sigma", "<f8"),  # rad/(m/s^2)
         ("gyro_bias_initial", "<f8", 3),  # rad/s
         ("accel_bias_initial", "<f8", 3),  # m/s^2
         ("tilt_initial", "<f8"),  # rad
@@ -98,9 +100,11 @@ STATE_DTYPE: Final = np.dtype(
         ("ba", "<f8", 3),  # m/s^2
         ("sg", "<f8", 3),
         ("sa", "<f8", 3),
-        ("mount", "<f8", 2),  # rad: pitch, yaw
+        ("mount", "<f8", 2),  # rad: pitch, yaw of the vehicle relative to the body
         ("point", "<f8", 3),  # m, body: where the vehicle does not slip
+        ("squat", "<f8"),  # rad/(m/s^2), per forward specific force, negative where the nose lifts
         ("w_smooth", "<f8", 3),  # rad/s, low-passed rate
+        ("f_smooth", "<f8", 3),  # m/s^2, low-passed specific force
         ("w_raw", "<f8", 3),  # rad/s, last sample
         ("f_raw", "<f8", 3),  # m/s^2, last sample
         # stop detector
@@ -175,6 +179,7 @@ EPOCH_DTYPE: Final = np.dtype(
         ("sa", "<f8", 3),
         ("mount", "<f8", 3),
         ("point", "<f8", 3),
+        ("squat", "<f8"),
     ],
     align=True,
 )

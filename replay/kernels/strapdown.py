@@ -61,10 +61,12 @@ def mechanize(nav, tx, ty, tz, ux, uy, uz, dt, scratch):
     cx, cy, cz = cross3(pt[0], pt[1], pt[2], tx, ty, tz)
     ax, ay, az = cross3(pt[0], pt[1], pt[2], ux, uy, uz)
     bx, by, bz = cross3(pu[0], pu[1], pu[2], tx, ty, tz)
+    # The body turns while it is pushed: to second order in the angle.
     rx, ry, rz = cross3(tx, ty, tz, ux, uy, uz)
-    sx = ux + 0.5 * rx + k * (ax + bx)
-    sy = uy + 0.5 * ry + k * (ay + by)
-    sz = uz + 0.5 * rz + k * (az + bz)
+    qx, qy, qz = cross3(tx, ty, tz, rx, ry, rz)
+    sx = ux + 0.5 * rx + qx / 6.0 + k * (ax + bx)
+    sy = uy + 0.5 * ry + qy / 6.0 + k * (ay + by)
+    sz = uz + 0.5 * rz + qz / 6.0 + k * (az + bz)
     # Velocity increment in ECEF axes of the middle of the interval: the Earth turned half-way.
     dx, dy, dz = rotate3(C, sx, sy, sz)
     half = 0.5 * EARTH_RATE_RAD_S * dt

@@ -31,7 +31,7 @@ from replay.kernels.rotation import (
 @njit(cache=True)
 def state_count(cfg):
     """Number of error states of a configuration."""
-    return cfg["states"] + 2 * cfg["mounting"] + 2 * cfg["lever"]
+    return cfg["states"] + 2 * cfg["mounting"] + 2 * cfg["lever"] + cfg["squat"]
 
 
 @njit(cache=True)
@@ -67,6 +67,8 @@ def feed_back(s, cfg, dx, scratch):
         point = s["point"]
         point[0] += dx[first]
         point[2] += dx[first + 1]
+    if cfg["squat"] == 1:
+        s["squat"] += dx[state_count(cfg) - 1]
     quaternion_from_vector(dx[ATTITUDE], dx[ATTITUDE + 1], dx[ATTITUDE + 2], scratch[0])
     quaternion_multiply(scratch[0], q, scratch[1])
     for i in range(4):

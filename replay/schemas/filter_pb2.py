@@ -26,25 +26,25 @@ _sym_db = _symbol_database.Default()
 from replay.schemas import geometry_pb2 as replay_dot_schemas_dot_geometry__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1breplay/schemas/filter.proto\x12\x06replay\x1a\x1dreplay/schemas/geometry.proto\"\xa4\x03\n\x0b\x46ilterState\x12(\n\x0fposition_ecef_m\x18\x01 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x11velocity_ecef_m_s\x18\x02 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x0eq_body_to_ecef\x18\x03 \x01(\x0b\x32\x12.replay.Quaternion\x12-\n\x14gyro_bias_body_rad_s\x18\x04 \x01(\x0b\x32\x0f.replay.Vector3\x12-\n\x14\x61\x63\x63\x65l_bias_body_m_s2\x18\x05 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x11gyro_scale_factor\x18\x06 \x01(\x0b\x32\x0f.replay.Vector3\x12+\n\x12\x61\x63\x63\x65l_scale_factor\x18\x07 \x01(\x0b\x32\x0f.replay.Vector3\x12,\n\x13mounting_angles_rad\x18\x08 \x01(\x0b\x32\x0f.replay.Vector3\x12.\n\x15non_slip_point_body_m\x18\t \x01(\x0b\x32\x0f.replay.Vector3\"R\n\x10\x46ilterCovariance\x12\x11\n\tdimension\x18\x01 \x01(\x07\x12\x13\n\x0bstate_names\x18\x02 \x01(\t\x12\x16\n\x0eupper_triangle\x18\x03 \x03(\x01\"\xe8\x01\n\nInnovation\x12%\n\x04kind\x18\x01 \x01(\x0e\x32\x17.replay.MeasurementKind\x12%\n\x04\x61xis\x18\x02 \x01(\x0e\x32\x17.replay.MeasurementAxis\x12\x11\n\tsatellite\x18\x03 \x01(\t\x12\x0e\n\x06signal\x18\x04 \x01(\t\x12\x12\n\ninnovation\x18\x05 \x01(\x01\x12\x16\n\x0einnovation_std\x18\x06 \x01(\x01\x12\x17\n\x0fmeasurement_std\x18\x07 \x01(\x01\x12\x12\n\nnormalized\x18\x08 \x01(\x01\x12\x10\n\x08\x61\x63\x63\x65pted\x18\t \x01(\x08\"M\n\x0b\x46ilterEvent\x12\x1f\n\x04kind\x18\x01 \x01(\x0e\x32\x11.replay.EventKind\x12\r\n\x05value\x18\x02 \x01(\x01\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t*\xdf\x02\n\x0fMeasurementKind\x12\x1c\n\x18MEASUREMENT_KIND_UNKNOWN\x10\x00\x12\x1d\n\x19MEASUREMENT_KIND_POSITION\x10\x01\x12\x1d\n\x19MEASUREMENT_KIND_VELOCITY\x10\x02\x12\"\n\x1eMEASUREMENT_KIND_ZERO_VELOCITY\x10\x03\x12&\n\"MEASUREMENT_KIND_ZERO_ANGULAR_RATE\x10\x04\x12\"\n\x1eMEASUREMENT_KIND_NON_HOLONOMIC\x10\x05\x12\x1c\n\x18MEASUREMENT_KIND_HEADING\x10\x06\x12 \n\x1cMEASUREMENT_KIND_PSEUDORANGE\x10\x07\x12\"\n\x1eMEASUREMENT_KIND_CARRIER_PHASE\x10\x08\x12\x1c\n\x18MEASUREMENT_KIND_DOPPLER\x10\t*\xd1\x01\n\x0fMeasurementAxis\x12\x19\n\x15MEASUREMENT_AXIS_NONE\x10\x00\x12\x19\n\x15MEASUREMENT_AXIS_EAST\x10\x01\x12\x1a\n\x16MEASUREMENT_AXIS_NORTH\x10\x02\x12\x17\n\x13MEASUREMENT_AXIS_UP\x10\x03\x12\x1c\n\x18MEASUREMENT_AXIS_FORWARD\x10\x04\x12\x1a\n\x16MEASUREMENT_AXIS_RIGHT\x10\x05\x12\x19\n\x15MEASUREMENT_AXIS_DOWN\x10\x06*\xe1\x02\n\tEventKind\x12\x16\n\x12\x45VENT_KIND_UNKNOWN\x10\x00\x12!\n\x1d\x45VENT_KIND_ALIGNMENT_LEVELLED\x10\x01\x12!\n\x1d\x45VENT_KIND_ALIGNMENT_COMPLETE\x10\x02\x12#\n\x1f\x45VENT_KIND_MEASUREMENT_REJECTED\x10\x03\x12\x1b\n\x17\x45VENT_KIND_OUTAGE_BEGIN\x10\x04\x12\x19\n\x15\x45VENT_KIND_OUTAGE_END\x10\x05\x12\x19\n\x15\x45VENT_KIND_STOP_BEGIN\x10\x06\x12\x17\n\x13\x45VENT_KIND_STOP_END\x10\x07\x12\x16\n\x12\x45VENT_KIND_IMU_GAP\x10\x08\x12\x1c\n\x18\x45VENT_KIND_TIME_BACKWARD\x10\t\x12\x19\n\x15\x45VENT_KIND_NOT_FINITE\x10\n\x12\x14\n\x10\x45VENT_KIND_RESET\x10\x0b\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1breplay/schemas/filter.proto\x12\x06replay\x1a\x1dreplay/schemas/geometry.proto\"\xbc\x03\n\x0b\x46ilterState\x12(\n\x0fposition_ecef_m\x18\x01 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x11velocity_ecef_m_s\x18\x02 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x0eq_body_to_ecef\x18\x03 \x01(\x0b\x32\x12.replay.Quaternion\x12-\n\x14gyro_bias_body_rad_s\x18\x04 \x01(\x0b\x32\x0f.replay.Vector3\x12-\n\x14\x61\x63\x63\x65l_bias_body_m_s2\x18\x05 \x01(\x0b\x32\x0f.replay.Vector3\x12*\n\x11gyro_scale_factor\x18\x06 \x01(\x0b\x32\x0f.replay.Vector3\x12+\n\x12\x61\x63\x63\x65l_scale_factor\x18\x07 \x01(\x0b\x32\x0f.replay.Vector3\x12,\n\x13mounting_angles_rad\x18\x08 \x01(\x0b\x32\x0f.replay.Vector3\x12.\n\x15non_slip_point_body_m\x18\t \x01(\x0b\x32\x0f.replay.Vector3\x12\x16\n\x0esquat_rad_s2_m\x18\n \x01(\x01\"R\n\x10\x46ilterCovariance\x12\x11\n\tdimension\x18\x01 \x01(\x07\x12\x13\n\x0bstate_names\x18\x02 \x01(\t\x12\x16\n\x0eupper_triangle\x18\x03 \x03(\x01\"\xe8\x01\n\nInnovation\x12%\n\x04kind\x18\x01 \x01(\x0e\x32\x17.replay.MeasurementKind\x12%\n\x04\x61xis\x18\x02 \x01(\x0e\x32\x17.replay.MeasurementAxis\x12\x11\n\tsatellite\x18\x03 \x01(\t\x12\x0e\n\x06signal\x18\x04 \x01(\t\x12\x12\n\ninnovation\x18\x05 \x01(\x01\x12\x16\n\x0einnovation_std\x18\x06 \x01(\x01\x12\x17\n\x0fmeasurement_std\x18\x07 \x01(\x01\x12\x12\n\nnormalized\x18\x08 \x01(\x01\x12\x10\n\x08\x61\x63\x63\x65pted\x18\t \x01(\x08\"M\n\x0b\x46ilterEvent\x12\x1f\n\x04kind\x18\x01 \x01(\x0e\x32\x11.replay.EventKind\x12\r\n\x05value\x18\x02 \x01(\x01\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t*\xdf\x02\n\x0fMeasurementKind\x12\x1c\n\x18MEASUREMENT_KIND_UNKNOWN\x10\x00\x12\x1d\n\x19MEASUREMENT_KIND_POSITION\x10\x01\x12\x1d\n\x19MEASUREMENT_KIND_VELOCITY\x10\x02\x12\"\n\x1eMEASUREMENT_KIND_ZERO_VELOCITY\x10\x03\x12&\n\"MEASUREMENT_KIND_ZERO_ANGULAR_RATE\x10\x04\x12\"\n\x1eMEASUREMENT_KIND_NON_HOLONOMIC\x10\x05\x12\x1c\n\x18MEASUREMENT_KIND_HEADING\x10\x06\x12 \n\x1cMEASUREMENT_KIND_PSEUDORANGE\x10\x07\x12\"\n\x1eMEASUREMENT_KIND_CARRIER_PHASE\x10\x08\x12\x1c\n\x18MEASUREMENT_KIND_DOPPLER\x10\t*\xd1\x01\n\x0fMeasurementAxis\x12\x19\n\x15MEASUREMENT_AXIS_NONE\x10\x00\x12\x19\n\x15MEASUREMENT_AXIS_EAST\x10\x01\x12\x1a\n\x16MEASUREMENT_AXIS_NORTH\x10\x02\x12\x17\n\x13MEASUREMENT_AXIS_UP\x10\x03\x12\x1c\n\x18MEASUREMENT_AXIS_FORWARD\x10\x04\x12\x1a\n\x16MEASUREMENT_AXIS_RIGHT\x10\x05\x12\x19\n\x15MEASUREMENT_AXIS_DOWN\x10\x06*\xe1\x02\n\tEventKind\x12\x16\n\x12\x45VENT_KIND_UNKNOWN\x10\x00\x12!\n\x1d\x45VENT_KIND_ALIGNMENT_LEVELLED\x10\x01\x12!\n\x1d\x45VENT_KIND_ALIGNMENT_COMPLETE\x10\x02\x12#\n\x1f\x45VENT_KIND_MEASUREMENT_REJECTED\x10\x03\x12\x1b\n\x17\x45VENT_KIND_OUTAGE_BEGIN\x10\x04\x12\x19\n\x15\x45VENT_KIND_OUTAGE_END\x10\x05\x12\x19\n\x15\x45VENT_KIND_STOP_BEGIN\x10\x06\x12\x17\n\x13\x45VENT_KIND_STOP_END\x10\x07\x12\x16\n\x12\x45VENT_KIND_IMU_GAP\x10\x08\x12\x1c\n\x18\x45VENT_KIND_TIME_BACKWARD\x10\t\x12\x19\n\x15\x45VENT_KIND_NOT_FINITE\x10\n\x12\x14\n\x10\x45VENT_KIND_RESET\x10\x0b\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'replay.schemas.filter_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_MEASUREMENTKIND']._serialized_start=892
-  _globals['_MEASUREMENTKIND']._serialized_end=1243
-  _globals['_MEASUREMENTAXIS']._serialized_start=1246
-  _globals['_MEASUREMENTAXIS']._serialized_end=1455
-  _globals['_EVENTKIND']._serialized_start=1458
-  _globals['_EVENTKIND']._serialized_end=1811
+  _globals['_MEASUREMENTKIND']._serialized_start=916
+  _globals['_MEASUREMENTKIND']._serialized_end=1267
+  _globals['_MEASUREMENTAXIS']._serialized_start=1270
+  _globals['_MEASUREMENTAXIS']._serialized_end=1479
+  _globals['_EVENTKIND']._serialized_start=1482
+  _globals['_EVENTKIND']._serialized_end=1835
   _globals['_FILTERSTATE']._serialized_start=71
-  _globals['_FILTERSTATE']._serialized_end=491
-  _globals['_FILTERCOVARIANCE']._serialized_start=493
-  _globals['_FILTERCOVARIANCE']._serialized_end=575
-  _globals['_INNOVATION']._serialized_start=578
-  _globals['_INNOVATION']._serialized_end=810
-  _globals['_FILTEREVENT']._serialized_start=812
-  _globals['_FILTEREVENT']._serialized_end=889
+  _globals['_FILTERSTATE']._serialized_end=515
+  _globals['_FILTERCOVARIANCE']._serialized_start=517
+  _globals['_FILTERCOVARIANCE']._serialized_end=599
+  _globals['_INNOVATION']._serialized_start=602
+  _globals['_INNOVATION']._serialized_end=834
+  _globals['_FILTEREVENT']._serialized_start=836
+  _globals['_FILTEREVENT']._serialized_end=913
 # @@protoc_insertion_point(module_scope)

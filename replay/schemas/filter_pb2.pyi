@@ -77,7 +77,7 @@ EVENT_KIND_NOT_FINITE: EventKind
 EVENT_KIND_RESET: EventKind
 
 class FilterState(_message.Message):
-    __slots__ = ("position_ecef_m", "velocity_ecef_m_s", "q_body_to_ecef", "gyro_bias_body_rad_s", "accel_bias_body_m_s2", "gyro_scale_factor", "accel_scale_factor", "mounting_angles_rad", "non_slip_point_body_m")
+    __slots__ = ("position_ecef_m", "velocity_ecef_m_s", "q_body_to_ecef", "gyro_bias_body_rad_s", "accel_bias_body_m_s2", "gyro_scale_factor", "accel_scale_factor", "mounting_angles_rad", "non_slip_point_body_m", "squat_rad_s2_m")
     POSITION_ECEF_M_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_ECEF_M_S_FIELD_NUMBER: _ClassVar[int]
     Q_BODY_TO_ECEF_FIELD_NUMBER: _ClassVar[int]
@@ -87,6 +87,7 @@ class FilterState(_message.Message):
     ACCEL_SCALE_FACTOR_FIELD_NUMBER: _ClassVar[int]
     MOUNTING_ANGLES_RAD_FIELD_NUMBER: _ClassVar[int]
     NON_SLIP_POINT_BODY_M_FIELD_NUMBER: _ClassVar[int]
+    SQUAT_RAD_S2_M_FIELD_NUMBER: _ClassVar[int]
     position_ecef_m: _geometry_pb2.Vector3
     velocity_ecef_m_s: _geometry_pb2.Vector3
     q_body_to_ecef: _geometry_pb2.Quaternion
@@ -96,7 +97,8 @@ class FilterState(_message.Message):
     accel_scale_factor: _geometry_pb2.Vector3
     mounting_angles_rad: _geometry_pb2.Vector3
     non_slip_point_body_m: _geometry_pb2.Vector3
-    def __init__(self, position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., velocity_ecef_m_s: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., q_body_to_ecef: _Optional[_Union[_geometry_pb2.Quaternion, _Mapping]] = ..., gyro_bias_body_rad_s: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., accel_bias_body_m_s2: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., gyro_scale_factor: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., accel_scale_factor: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., mounting_angles_rad: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., non_slip_point_body_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ...) -> None: ...
+    squat_rad_s2_m: float
+    def __init__(self, position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., velocity_ecef_m_s: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., q_body_to_ecef: _Optional[_Union[_geometry_pb2.Quaternion, _Mapping]] = ..., gyro_bias_body_rad_s: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., accel_bias_body_m_s2: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., gyro_scale_factor: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., accel_scale_factor: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., mounting_angles_rad: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., non_slip_point_body_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., squat_rad_s2_m: _Optional[float] = ...) -> None: ...
 
 class FilterCovariance(_message.Message):
     __slots__ = ("dimension", "state_names", "upper_triangle")

@@ -130,6 +130,7 @@ class GnssInsLoose:
             int(state.config["states"][0]),
             mounting=bool(state.config["mounting"][0]),
             lever=bool(state.config["lever"][0]),
+            squat=bool(state.config["squat"][0]),
         )
         states = len(names)
         # Rows that a block can give at most: predictions, one before and one at each fix.
@@ -216,6 +217,8 @@ def _config_record(config: LooseConfig, context: Context) -> Array:
         "mounting_noise": nhc.mounting_noise,
         "lever": int(nhc.enabled and nhc.estimate_lever_arm),
         "lever_sigma": nhc.lever_arm_sigma,
+        "squat": int(nhc.enabled and nhc.estimate_squat),
+        "squat_sigma": nhc.squat_sigma,
         "rest_sigma": align.rest_sigma,
         "gyro_bias_initial": align.gyro_bias_sigma,
         "accel_bias_initial": align.accel_bias_sigma,
@@ -323,6 +326,7 @@ def _state_columns(rows: Array) -> Columns:
             "accel_scale_factor": rows["sa"],
             "mounting_angles_rad": rows["mount"],
             "non_slip_point_body_m": rows["point"],
+            "squat_rad_s2_m": rows["squat"],
         },
     )
 

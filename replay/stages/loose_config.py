@@ -13,7 +13,7 @@ from typing import Annotated
 from replay.configuration import Section, quantity
 
 
-class Filter(Section):
+class Filter(Section, frozen=True):
     """States and process noise."""
 
     states: int = 15
@@ -41,7 +41,7 @@ class Filter(Section):
     accel_scale_tau: Annotated[float, quantity("s", "correlation time; 0 is a constant")] = 0.0
 
 
-class Alignment(Section):
+class Alignment(Section, frozen=True):
     """First attitude and what is known at its time."""
 
     rest_time: Annotated[float, quantity("s", "rest before levelling")] = 3.0
@@ -65,7 +65,7 @@ class Alignment(Section):
     )
 
 
-class Gnss(Section):
+class Gnss(Section, frozen=True):
     """How fixes are used."""
 
     receiver: str = ""
@@ -88,7 +88,7 @@ class Gnss(Section):
     outage_limit: Annotated[float, quantity("s", "without a position")] = 1.5
 
 
-class Stops(Section):
+class Stops(Section, frozen=True):
     """Zero velocity and zero angular rate at detected stops."""
 
     zero_velocity: bool = False
@@ -108,7 +108,7 @@ class Stops(Section):
     )
 
 
-class NonHolonomic(Section):
+class NonHolonomic(Section, frozen=True):
     """Wheels do not slip: no velocity to the right or down at a point of the vehicle."""
 
     enabled: bool = False
@@ -126,25 +126,29 @@ class NonHolonomic(Section):
     lever_arm_sigma: tuple[
         Annotated[float, quantity("m", "forward and down coordinate at the start")], ...
     ] = (1.0, 0.5)
+    estimate_squat: bool = False
+    squat_sigma: Annotated[
+        float, quantity("rad/(m/s^2)", "pitching on the springs at the start")
+    ] = 2.0e-3
     mounting: bool = True
     mounting_sigma: Annotated[float, quantity("rad", "pitch and yaw at the start")] = 0.02
     mounting_noise: Annotated[float, quantity("rad/sqrt(s)", "their random walk")] = 0.0
 
 
-class Imu(Section):
+class Imu(Section, frozen=True):
     """What is said of the inertial channel."""
 
     interval: Annotated[float, quantity("s", "nominal; 0 takes the median of the log")] = 0.0
     gap: Annotated[float, quantity("s", "interval that is a gap; 0 is 5 nominal ones")] = 0.0
 
 
-class Output(Section):
+class Output(Section, frozen=True):
     """What is written how often."""
 
     solution_interval: Annotated[float, quantity("s", "between predicted rows")] = 0.1
 
 
-class LooseConfig(Section):
+class LooseConfig(Section, frozen=True):
     """Settings of `gnss-ins-lc`."""
 
     name: str = "gnss-ins-lc"

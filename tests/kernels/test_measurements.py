@@ -9,7 +9,7 @@ from replay.schemas import filter_pb2, solution_pb2
 from tests.kernels.test_strapdown import start
 
 SIZES = np.array(
-    [1.0] * 3 + [0.1] * 3 + [1e-5] * 3 + [1e-4] * 3 + [1e-3] * 3 + [1e-4] * 6 + [1e-5] * 2 + [0.01] * 2
+    [1.0] * 3 + [0.1] * 3 + [1e-5] * 3 + [1e-4] * 3 + [1e-3] * 3 + [1e-4] * 6 + [1e-5] * 2 + [0.01] * 2 + [1e-5]
 )
 LEVER = [0.8, -0.4, -1.2]
 W_RAW = np.array([0.05, -0.1, 0.4])
@@ -20,7 +20,7 @@ WINDOW = 0.25
 def config(**values):
     cfg = np.zeros(1, dtype=records.CONFIG_DTYPE)
     defaults = {
-        "states": 21, "mounting": 1, "lever": 1, "imu_interval": 0.01, "stop_interval": 0.1,
+        "states": 21, "mounting": 1, "lever": 1, "squat": 1, "imu_interval": 0.01, "stop_interval": 0.1,
         "nhc_right_sigma": 0.1, "nhc_down_sigma": 0.1, "zero_velocity_sigma": 0.1,
         "zero_rate_sigma": 0.1, "position_scale": 1.0, "velocity_scale": 1.0,
         "nhc_speed": 0.1, "position_floor": 0.0,
@@ -51,7 +51,9 @@ def state_with(error):
     w = (W_RAW - state["bg"]) / (1 + state["sg"])
     f = (F_RAW - state["ba"]) / (1 + state["sa"])
     state["nav"]["f_e"] = C @ f
+    state["squat"] = 0.003 + error[25]
     state["w_smooth"] = w
+    state["f_smooth"] = [1.5, 0.0, 0.0]
     for _ in range(20):
         constraints.push_sample(state, state["w_raw"], state["f_raw"])
     state["P"] = np.eye(records.MAX_STATES)
@@ -70,14 +72,14 @@ def sensitivities(measure, cfg, k):
         assert measure(state, cfg, work, rows, counts, error)
         return rows["z"][:k].copy(), work
 
-    base, work = innovation(np.zeros(25))
+    base, work = innovation(np.zeros(26))
     count = int(np.argmax(np.append(work["index"][1:], -1) <= 0) + 1)
-    dense = np.zeros((k, 25))
+    dense = np.zeros((k, 26))
     for column in range(count):
         dense[:, work["index"][column]] += work["H"][:k, column]
-    numeric = np.zeros((k, 25))
-    for j in range(25):
-        error = np.zeros(25)
+    numeric = np.zeros((k, 26))
+    for j in range(26):
+        error = np.zeros(26)
         error[j] = SIZES[j]
         # The innovation is measured minus predicted, and falls as the estimate grows.
         numeric[:, j] = (innovation(-error)[0] - innovation(error)[0]) / (2 * SIZES[j])
@@ -86,7 +88,7 @@ def sensitivities(measure, cfg, k):
 
 def fix_record():
     fix = np.zeros(1, dtype=records.FIX_DTYPE)
-    state, _, _ = state_with(np.zeros(25))
+    state, _, _ = state_with(np.zeros(26))
     fix["r"] = state["nav"]["r"] + [0.2, 0.1, -0.3]
     fix["v"] = state["nav"]["v"]
     fix["R"] = [[1.0, 0.1, 0.2, 2.0, 0.3, 3.0]]
@@ -125,7 +127,7 @@ def test_mean_velocity_over_a_window():
         # What the velocity was over the window, if the error grew as the error model says.
         acceleration = -np.cross(s["nav"]["f_e"], error[6:9]) - np.array(s["nav"]["C"]) @ error[12:15]
         mean_error = error[3:6] - 0.5 * WINDOW * acceleration
-        base, _, _ = state_with(np.zeros(25))
+        base, _, _ = state_with(np.zeros(26))
         s["moved"] = WINDOW * (base["nav"]["v"] + mean_error)
         s["moved_t"], s["t"] = 0, now
         return gnss_update.velocity_update(s, cfg, work, fix, True, now, now, rows, counts)
@@ -133,7 +135,7 @@ def test_mean_velocity_over_a_window():
     dense, numeric, _ = sensitivities(measure, cfg, 3)
     # Scale factors act through the state here and not through the displacement that is given;
     # the lever arm's part is the mean over the window, the model takes it at the end.
-    used = np.r_[0:6, 12:15, 21:25]
+    used = np.r_[0:6, 12:15, 21:26]
     np.testing.assert_allclose(dense[:, used], numeric[:, used], atol=2e-5)
     turn = np.linalg.norm(np.cross(W_RAW, LEVER)) + np.linalg.norm(LEVER) / WINDOW
     np.testing.assert_allclose(dense[:, 6:9], numeric[:, 6:9], atol=turn)
@@ -174,12 +176,12 @@ def test_non_holonomic():
 
 def test_feedback_adds_truth_minus_estimate():
     cfg = config()
-    dx = np.zeros(25)
-    dx[:] = SIZES * np.random.default_rng(1).normal(size=25)
-    estimate, _, _ = state_with(np.zeros(25))
+    dx = np.zeros(26)
+    dx[:] = SIZES * np.random.default_rng(1).normal(size=26)
+    estimate, _, _ = state_with(np.zeros(26))
     truth, _, _ = state_with(dx)
     update.feed_back(estimate, cfg, dx, np.zeros((2, 4)))
-    for name in ("bg", "ba", "sg", "sa", "mount", "point"):
+    for name in ("bg", "ba", "sg", "sa", "mount", "point", "squat"):
         np.testing.assert_allclose(estimate[name], truth[name], atol=1e-14)
     np.testing.assert_allclose(estimate["nav"]["r"], truth["nav"]["r"], atol=1e-8)
     np.testing.assert_allclose(estimate["nav"]["v"], truth["nav"]["v"], atol=1e-13)
