@@ -1,5 +1,7 @@
-"""The only table of topics: what each channel carries, how its rows are told apart
-and how far two runs may differ before a person has to look.
+"""The only table of topics.
+
+It says what each channel carries, how its rows are told apart and how far two runs
+may differ before a person has to look.
 
 A topic is a pattern; `{name}` stands for one path element that a run or a
 receiver chooses. Nothing else in the package spells a topic.

@@ -7,6 +7,7 @@ known one. Later tables win over earlier ones, key by key.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import re
@@ -135,10 +136,8 @@ def parse_assignments(assignments: Iterable[str]) -> Table:
                 f"{assignment!r} is no assignment", mend="write --set section.key=value"
             )
         value: Any = text.strip()
-        try:
+        with contextlib.suppress(tomllib.TOMLDecodeError):  # bare words and quantities are text
             value = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            pass  # bare words and quantities are text
         nested: Table = {}
         inner = nested
         *sections, key = path.strip().split(".")

@@ -55,8 +55,8 @@ def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
 
     found = describe(log)
     packed = ", ".join(
-        f"{name or 'not compressed'} {stats.compressed_bytes / max(1, stats.uncompressed_bytes):.0%}"
-        for name, stats in found.compression.items()
+        f"{name or 'not compressed'} {s.compressed_bytes / max(1, s.uncompressed_bytes):.0%}"
+        for name, s in found.compression.items()
     )
     say(f"{found.path}: {found.file_bytes / 1e6:,.1f} MB, {packed}, by {found.library}")
     table = Table("channel", "message", "rows", "rate", "from (GPS time)", "span", "gaps", "sha256")

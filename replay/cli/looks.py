@@ -10,7 +10,7 @@ import typer
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.cli.runs import Output
-from replay.errors import MissingChannelError, UsageError
+from replay.errors import ExitCode, MissingChannelError, UsageError
 
 
 @app.command()
@@ -77,7 +77,7 @@ def diff(
 
         write_rrd(result, rrd)
         warn(f"recording: {rrd}")
-    leave(result.exit_code)
+    leave(ExitCode(result.exit_code))
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +23,7 @@ ShowProgress = Annotated[
 
 
 @contextmanager
-def progress_bar(words: str, show: bool | None) -> Iterator[typer.models.AnyType]:
+def progress_bar(words: str, show: bool | None) -> Iterator[Callable[[float], None]]:
     """A bar on the error stream; the value is told the fraction done."""
     visible = err.is_terminal if show is None else show
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())

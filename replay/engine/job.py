@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from replay import configuration
@@ -62,7 +62,7 @@ def make_job(
     reader: LogReader,
     pipeline_name: str,
     *,
-    tables: list[Mapping[str, Any]],
+    tables: Sequence[Mapping[str, Any]],
     start_ns: int | None = None,
     end_ns: int | None = None,
     checkpoint_every_s: int = 0,

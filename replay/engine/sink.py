@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from replay.log.channel_info import ChannelInfo
 from replay.log.columns import Columns
 from replay.log.digest import ChannelDigest, Digester
 from replay.log.names import DEPTH_KEY
-from replay.log.reader import ChannelInfo
 
 
 class Sink(Protocol):

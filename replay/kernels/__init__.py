@@ -52,4 +52,5 @@ def _cache_folder() -> str:
     return str(Path(base) / source_hash())
 
 
-numba.config.CACHE_DIR = _cache_folder()
+# numba fills its settings in at run time, so a type checker does not know this one.
+setattr(numba.config, "CACHE_DIR", _cache_folder())  # noqa: B010

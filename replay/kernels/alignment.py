@@ -41,6 +41,7 @@ from replay.kernels.rotation import (
     rotate3,
     rotate3_back,
 )
+from replay.kernels.types import Array, Record
 from replay.kernels.update import diagonal, fill_covariance, record_event, state_count
 
 _GRAVITY_M_S2 = 9.80665
@@ -49,12 +50,12 @@ _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
 
 @njit(cache=True)
-def _square(x):
+def _square(x: float) -> float:
     return x * x
 
 
 @njit(cache=True)
-def _level(s, work):
+def _level(s: Record, work: Record) -> None:
     """Roll, pitch and gyro bias from the sums at rest."""
     total = s["rest_sum"]
     count = s["rest_count"]
@@ -72,7 +73,16 @@ def _level(s, work):
 
 
 @njit(cache=True)
-def align_sample(s, cfg, work, dt, t, log_t, events, counts):
+def align_sample(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    dt: float,
+    t: int,
+    log_t: int,
+    events: Array,
+    counts: Array,
+) -> None:
     """Take one inertial sample (in `s["w_raw"]`, `s["f_raw"]`) while the attitude is unknown."""
     w, f = s["w_raw"], s["f_raw"]
     push_sample(s, w, f)
@@ -105,7 +115,9 @@ def align_sample(s, cfg, work, dt, t, log_t, events, counts):
 
 
 @njit(cache=True)
-def align_fix(s, cfg, work, fix, log_t, events, counts):
+def align_fix(
+    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, events: Array, counts: Array
+) -> bool:
     """Take one fix while the heading is unknown; True where the filter begins to run."""
     u = work["axes"]
     enu_axes(fix["r"][0], fix["r"][1], fix["r"][2], u)
@@ -180,7 +192,7 @@ def align_fix(s, cfg, work, fix, log_t, events, counts):
 
 
 @njit(cache=True)
-def _north_east_down(u, out):
+def _north_east_down(u: Array, out: Array) -> None:
     """C_n_e into `out` from the rows of east, north and up."""
     for i in range(3):
         out[i, 0] = u[1, i]
@@ -189,7 +201,19 @@ def _north_east_down(u, out):
 
 
 @njit(cache=True)
-def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
+def _start(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    fix: Record,
+    roll: float,
+    pitch: float,
+    heading: float,
+    ve: float,
+    vn: float,
+    vu: float,
+    factor: float,
+) -> None:
     """Navigation state and covariance at a fix (velocity in east, north, up)."""
     nav = s["nav"]
     u, M, N = work["axes"], work["M"], work["N"]
@@ -252,7 +276,7 @@ def _start(s, cfg, work, fix, roll, pitch, heading, ve, vn, vu, factor):
 
 
 @njit(cache=True)
-def _tie_tilt_to_bias(s, cfg, work):
+def _tie_tilt_to_bias(s: Record, cfg: Record, work: Record) -> None:
     """What levelling at rest leaves: tilt and accelerometer bias are wrong together.
 
     The specific force of then, turned with the attitude of then, stands against
@@ -283,7 +307,7 @@ def _tie_tilt_to_bias(s, cfg, work):
 
 
 @njit(cache=True)
-def _rotate_block(P, offset, u, R):
+def _rotate_block(P: Array, offset: int, u: Array, R: Array) -> None:
     """Put u' R u (3, 3) on the diagonal of P at `offset`."""
     for i in range(3):
         for j in range(i, 3):

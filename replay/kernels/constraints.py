@@ -18,11 +18,12 @@ from replay.kernels.records import (
     WINDOW,
 )
 from replay.kernels.rotation import cross3, rotate3, rotate3_back
+from replay.kernels.types import Array, Record
 from replay.kernels.update import diagonal, update
 
 
 @njit(cache=True)
-def push_sample(s, w, f):
+def push_sample(s: Record, w: Array, f: Array) -> None:
     """Put one sample (rad/s, m/s^2; body) into the window."""
     head = s["window_head"]
     row = s["window"][head]
@@ -35,13 +36,13 @@ def push_sample(s, w, f):
 
 
 @njit(cache=True)
-def samples_in(seconds, cfg):
+def samples_in(seconds: float, cfg: Record) -> int:
     """Number of samples in a stretch of time, at least one and at most the window."""
     return min(WINDOW, max(1, int(seconds / cfg["imu_interval"] + 0.5)))
 
 
 @njit(cache=True)
-def window_mean(s, skip, length, mean):
+def window_mean(s: Record, skip: int, length: int, mean: Array) -> None:
     """Mean (6: rad/s, m/s^2) of `length` samples that end `skip` samples ago into `mean`."""
     window = s["window"]
     start = s["window_head"] - skip - length + 2 * WINDOW
@@ -56,7 +57,7 @@ def window_mean(s, skip, length, mean):
 
 
 @njit(cache=True)
-def is_still(s, cfg, work, bias_known):
+def is_still(s: Record, cfg: Record, work: Record, bias_known: bool) -> bool:
     """Whether the window of the stop detector shows rest.
 
     Samples are averaged in short blocks first: an idling engine shakes a sensor by
@@ -81,7 +82,9 @@ def is_still(s, cfg, work, bias_known):
 
 
 @njit(cache=True)
-def zero_velocity_update(s, cfg, work, t, log_t, innovations, counts):
+def zero_velocity_update(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, innovations: Array, counts: Array
+) -> bool:
     """The vehicle stands: its velocity is nought, in body axes."""
     nav = s["nav"]
     v, C = nav["v"], nav["C"]
@@ -111,7 +114,9 @@ def zero_velocity_update(s, cfg, work, t, log_t, innovations, counts):
 
 
 @njit(cache=True)
-def zero_rate_update(s, cfg, work, t, log_t, innovations, counts):
+def zero_rate_update(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, innovations: Array, counts: Array
+) -> bool:
     """The vehicle stands: the gyros sense the Earth's rate and their bias alone."""
     nav = s["nav"]
     C, bg = nav["C"], s["bg"]
@@ -137,7 +142,9 @@ def zero_rate_update(s, cfg, work, t, log_t, innovations, counts):
 
 
 @njit(cache=True)
-def non_holonomic_update(s, cfg, work, t, log_t, innovations, counts):
+def non_holonomic_update(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, innovations: Array, counts: Array
+) -> bool:
     """Wheels roll forward: no velocity to the right or down at a point of the vehicle.
 
     With mounting pitch p and yaw y, small angles of the vehicle relative to the body, the

@@ -18,6 +18,7 @@ from numba import njit
 
 from replay.kernels.earth import EARTH_RATE_RAD_S, GRAVITATIONAL_CONSTANT_M3_S2
 from replay.kernels.elementary import sqrt
+from replay.kernels.types import Array, Record
 
 POSITION = 0
 VELOCITY = 3
@@ -29,7 +30,17 @@ ACCEL_SCALE = 18
 
 
 @njit(cache=True)
-def _apply(row, out, dt, G, C, A, W, f, scaled):
+def _apply(
+    row: Array,
+    out: Array,
+    dt: float,
+    G: Array,
+    C: Array,
+    A: Array,
+    W: Array,
+    f: Array,
+    scaled: bool,
+) -> None:
     """One row of P times the transpose of the first nine rows of the transition matrix."""
     w = EARTH_RATE_RAD_S * dt
     w2 = 2.0 * w
@@ -71,7 +82,7 @@ def _apply(row, out, dt, G, C, A, W, f, scaled):
 
 
 @njit(cache=True)
-def _add_body_noise(P, first, C, noise):
+def _add_body_noise(P: Array, first: int, C: Array, noise: Array) -> None:
     """Add C diag(noise) C' to the (3, 3) block at `first`."""
     a, b, c = noise[first], noise[first + 1], noise[first + 2]
     for i in range(3):
@@ -84,7 +95,20 @@ def _add_body_noise(P, first, C, noise):
 
 
 @njit(cache=True)
-def propagate(P, n, scaled, r, C, f_e, f_b, w_b, dt, decay, noise, work):
+def propagate(
+    P: Array,
+    n: int,
+    scaled: bool,
+    r: Array,
+    C: Array,
+    f_e: Array,
+    f_b: Array,
+    w_b: Array,
+    dt: float,
+    decay: Array,
+    noise: Array,
+    work: Record,
+) -> None:
     """P becomes Phi P Phi' + Q over one interval, exactly symmetric.
 
     Parameters

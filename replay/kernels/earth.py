@@ -8,6 +8,7 @@ than 1e-9 m/s^2, plus the centrifugal term, in ECEF components.
 from numba import njit
 
 from replay.kernels.elementary import atan2, sqrt
+from replay.kernels.types import Array
 
 SEMI_MAJOR_AXIS_M = 6378137.0  # NIMA TR8350.2, table 3.1
 FLATTENING = 1.0 / 298.257223563  # NIMA TR8350.2, table 3.1
@@ -28,7 +29,7 @@ _J8 = -3.0 * _E4 * _E4 / 99.0 * (1.0 - 4.0 + 4.0 * _R)
 
 
 @njit(cache=True)
-def gravitation(x, y, z):
+def gravitation(x: float, y: float, z: float) -> tuple[float, float, float]:
     """Normal gravitation (no centrifugal part) at an ECEF position.
 
     Parameters
@@ -68,7 +69,7 @@ def gravitation(x, y, z):
 
 
 @njit(cache=True)
-def gravity(x, y, z):
+def gravity(x: float, y: float, z: float) -> tuple[float, float, float]:
     """Normal gravity: gravitation and the centrifugal acceleration (Groves 2e, eq. 2.133).
 
     Parameters
@@ -86,7 +87,7 @@ def gravity(x, y, z):
 
 
 @njit(cache=True)
-def surface_normal(x, y, z):
+def surface_normal(x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
     """Sines and cosines of geodetic latitude and longitude, and the height.
 
     Bowring's iteration (1976) on the tangent of the reduced latitude, with square
@@ -134,14 +135,14 @@ def surface_normal(x, y, z):
 
 
 @njit(cache=True)
-def geodetic(x, y, z):
+def geodetic(x: float, y: float, z: float) -> tuple[float, float, float]:
     """Geodetic latitude, longitude (rad) and ellipsoidal height (m) of an ECEF position (m)."""
     sin_lat, cos_lat, sin_lon, cos_lon, height = surface_normal(x, y, z)
     return atan2(sin_lat, cos_lat), atan2(sin_lon, cos_lon), height
 
 
 @njit(cache=True)
-def enu_axes(x, y, z, out):
+def enu_axes(x: float, y: float, z: float, out: Array) -> None:
     """Rows of `out` (3, 3) become the east, north and up unit vectors in ECEF: C_e_l."""
     sin_lat, cos_lat, sin_lon, cos_lon, _ = surface_normal(x, y, z)
     out[0, 0] = -sin_lon
@@ -156,7 +157,9 @@ def enu_axes(x, y, z, out):
 
 
 @njit(cache=True)
-def ecef_from_geodetic(sin_lat, cos_lat, sin_lon, cos_lon, height):
+def ecef_from_geodetic(
+    sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float, height: float
+) -> tuple[float, float, float]:
     """ECEF position (m) from sines and cosines of geodetic coordinates and the height (m)."""
     n = SEMI_MAJOR_AXIS_M / sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat)
     return (

@@ -17,13 +17,24 @@ from replay.kernels.covariance import (
 from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
 from replay.kernels.records import AXIS_EAST, KIND_POSITION, KIND_VELOCITY
 from replay.kernels.rotation import cross3, rotate3, rotate3_back
+from replay.kernels.types import Array, Record
 from replay.kernels.update import fill_covariance, update
 
 _WINDOW_SLACK = 0.1  # how far the last epoch may be off, as a part of the window
 
 
 @njit(cache=True)
-def position_update(s, cfg, work, fix, force, t, log_t, innovations, counts):
+def position_update(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    fix: Record,
+    force: bool,
+    t: int,
+    log_t: int,
+    innovations: Array,
+    counts: Array,
+) -> bool:
     """Use the position of a fix; whether it was used."""
     nav = s["nav"]
     r, C, lever = nav["r"], nav["C"], fix["lever"]
@@ -50,7 +61,7 @@ def position_update(s, cfg, work, fix, force, t, log_t, innovations, counts):
 
 
 @njit(cache=True)
-def mark_epoch(s, fix):
+def mark_epoch(s: Record, fix: Record) -> None:
     """Begin to sum displacement at this fix, for the mean velocity at the next one."""
     nav = s["nav"]
     lever = fix["lever"]
@@ -64,7 +75,17 @@ def mark_epoch(s, fix):
 
 
 @njit(cache=True)
-def velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts):
+def velocity_update(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    fix: Record,
+    force: bool,
+    t: int,
+    log_t: int,
+    innovations: Array,
+    counts: Array,
+) -> bool:
     """Use the velocity of a fix; whether it was used.
 
     A receiver that averages velocity over a window before the epoch (from carrier

@@ -4,8 +4,12 @@ Each row's bytes are mixed word by word with the multiply-xorshift steps of
 splitmix64 (Steele, Lea, Flood 2014) and chained to the digest before it.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+
+from replay.kernels.types import Array
 
 _MULTIPLIER_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MULTIPLIER_2 = np.uint64(0x94D049BB133111EB)
@@ -16,7 +20,7 @@ _S31 = np.uint64(31)
 
 
 @njit(cache=True)
-def mix(h):
+def mix(h: Any) -> Any:
     """One round of splitmix64 on a 64-bit word."""
     h = (h ^ (h >> _S30)) * _MULTIPLIER_1
     h = (h ^ (h >> _S27)) * _MULTIPLIER_2
@@ -24,20 +28,22 @@ def mix(h):
 
 
 @njit(cache=True)
-def combine(a, b):
+def combine(a: Any, b: Any) -> Any:
     """Digest of two digests, in this order."""
     return mix((mix(a + _GOLDEN) ^ b) + _GOLDEN)
 
 
 @njit(cache=True)
-def combine_rows(total, more):
+def combine_rows(total: Array, more: Array) -> None:
     """Replace each of `total` by its combination with the same place of `more`."""
     for i in range(total.shape[0]):
         total[i] = combine(total[i], more[i])
 
 
 @njit(cache=True)
-def rolling_digest(seed, log_t, valid_t, offsets, lengths, data, out):
+def rolling_digest(
+    seed: Any, log_t: Array, valid_t: Array, offsets: Array, lengths: Array, data: Array, out: Array
+) -> Any:
     """Chain rows to `seed`; `out[i]` is the digest after row i.
 
     Parameters

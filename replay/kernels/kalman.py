@@ -10,10 +10,11 @@ mirrored, it leaves P exactly symmetric.
 from numba import njit
 
 from replay.kernels.elementary import sqrt
+from replay.kernels.types import Array
 
 
 @njit(cache=True)
-def cholesky3(R, k, L):
+def cholesky3(R: Array, k: int, L: Array) -> bool:
     """Lower Cholesky factor of the leading k by k block of `R`; False where it has none."""
     for i in range(k):
         for j in range(i + 1):
@@ -30,7 +31,7 @@ def cholesky3(R, k, L):
 
 
 @njit(cache=True)
-def forward_square3(L, z, k):
+def forward_square3(L: Array, z: Array, k: int) -> float:
     """Z' (L L')^-1 z for the leading k components."""
     y0 = z[0] / L[0, 0]
     total = y0 * y0
@@ -44,7 +45,9 @@ def forward_square3(L, z, k):
 
 
 @njit(cache=True)
-def innovation_covariance(P, n, H, index, count, R, k, PH, S):
+def innovation_covariance(
+    P: Array, n: int, H: Array, index: Array, count: int, R: Array, k: int, PH: Array, S: Array
+) -> None:
     """PH = P H' (k, n) and S = H P H' + R (k, k).
 
     `H` (k, count) holds the columns of the states that `index` (count,) names; the rest are zero.
@@ -65,7 +68,9 @@ def innovation_covariance(P, n, H, index, count, R, k, PH, S):
 
 
 @njit(cache=True)
-def scalar_update(P, n, h, index, count, z, dx, b, gain):
+def scalar_update(
+    P: Array, n: int, h: Array, index: Array, count: int, z: float, dx: Array, b: Array, gain: Array
+) -> None:
     """Use one scalar measurement of unit variance.
 
     Parameters
@@ -108,7 +113,21 @@ def scalar_update(P, n, h, index, count, z, dx, b, gain):
 
 
 @njit(cache=True)
-def whitened_update(P, n, H, index, count, z, R, k, dx, L, h, b, gain):
+def whitened_update(
+    P: Array,
+    n: int,
+    H: Array,
+    index: Array,
+    count: int,
+    z: Array,
+    R: Array,
+    k: int,
+    dx: Array,
+    L: Array,
+    h: Array,
+    b: Array,
+    gain: Array,
+) -> bool:
     """Use a measurement of k components with covariance `R`; False where `R` is not definite.
 
     Parameters

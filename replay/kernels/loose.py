@@ -15,10 +15,10 @@ from replay.kernels.constraints import (
     zero_rate_update,
     zero_velocity_update,
 )
-from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY, propagate
-from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
-from replay.kernels.elementary import exp, sqrt
+from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
+from replay.kernels.output_rows import emit_epoch, emit_solution
+from replay.kernels.prediction import advance, remove_sensor_errors
 from replay.kernels.records import (
     EVENT_IMU_GAP,
     EVENT_NOT_FINITE,
@@ -34,197 +34,21 @@ from replay.kernels.records import (
     STATUS_PREDICTED,
     STATUS_UPDATED,
 )
-from replay.kernels.rotation import euler_from_matrix, rotate3, rotate3_back
-from replay.kernels.strapdown import mechanize
-from replay.kernels.update import record_event, state_count
+from replay.kernels.types import Array, Record
+from replay.kernels.update import record_event
 
 NOTE_IMU = 0
 NOTE_FIX = 1
 
 
 @njit(cache=True)
-def _decay_and_noise(cfg, work, dt):
-    """Fill the transition's diagonal and the noise of an interval; they repeat, so keep them."""
-    if work["decay_dt"] == dt:
-        return
-    work["decay_dt"] = dt
-    decay, noise = work["decay"], work["noise"]
-    for i in range(3):
-        noise[POSITION + i] = 0.0
-        noise[VELOCITY + i] = cfg["accel_noise"][i] * cfg["accel_noise"][i] * dt
-        noise[ATTITUDE + i] = cfg["gyro_noise"][i] * cfg["gyro_noise"][i] * dt
-    _gauss_markov(decay, noise, 9, cfg["gyro_bias_sigma"], cfg["gyro_bias_tau"], dt)
-    _gauss_markov(decay, noise, 12, cfg["accel_bias_sigma"], cfg["accel_bias_tau"], dt)
-    if cfg["states"] == 21:
-        _gauss_markov(decay, noise, 15, cfg["gyro_scale_sigma"], cfg["gyro_scale_tau"], dt)
-        _gauss_markov(decay, noise, 18, cfg["accel_scale_sigma"], cfg["accel_scale_tau"], dt)
-    if cfg["mounting"] == 1:
-        for i in range(cfg["states"], cfg["states"] + 2):
-            decay[i] = 1.0
-            noise[i] = cfg["mounting_noise"] * cfg["mounting_noise"] * dt
-    for i in range(cfg["states"] + 2 * cfg["mounting"], state_count(cfg)):
-        decay[i] = 1.0
-        noise[i] = 0.0
-
-
-@njit(cache=True)
-def _gauss_markov(decay, noise, first, sigma, tau, dt):
-    """First-order Gauss-Markov process in three states; tau of nought or less is a constant."""
-    d = 1.0
-    if tau > 0.0:
-        d = exp(-dt / tau)
-    for i in range(3):
-        decay[first + i] = d
-        noise[first + i] = sigma[i] * sigma[i] * (1.0 - d * d)
-
-
-@njit(cache=True)
-def _remove_sensor_errors(s, work):
-    """Rate and specific force of the sample at hand into the scratch."""
-    w, f = work["w"], work["f"]
-    w_raw, f_raw, bg, ba, sg, sa = s["w_raw"], s["f_raw"], s["bg"], s["ba"], s["sg"], s["sa"]
-    for i in range(3):
-        w[i] = (w_raw[i] - bg[i]) / (1.0 + sg[i])
-        f[i] = (f_raw[i] - ba[i]) / (1.0 + sa[i])
-
-
-@njit(cache=True)
-def _advance(s, cfg, work, t):
-    """Carry state and covariance to `t` (ns) with the sample at hand."""
-    dt = (t - s["t"]) * 1e-9
-    if dt <= 0.0:
-        return
-    nav = s["nav"]
-    w, f = work["w"], work["f"]
-    _remove_sensor_errors(s, work)
-    r, moved = nav["r"], s["moved"]
-    for i in range(3):
-        moved[i] -= r[i]
-    mechanize(nav, w[0] * dt, w[1] * dt, w[2] * dt, f[0] * dt, f[1] * dt, f[2] * dt, dt, work["q"])
-    _decay_and_noise(cfg, work, dt)
-    propagate(
-        s["P"], state_count(cfg), cfg["states"] == 21, nav["r"], nav["C"], nav["f_e"], f, w, dt,
-        work["decay"], work["noise"], work["T"],
-    )  # fmt: skip
-    smooth = 1.0
-    if cfg["nhc_smoothing"] > 0.0:
-        smooth = 1.0 - exp(-dt / cfg["nhc_smoothing"])
-    w_smooth, f_smooth = s["w_smooth"], s["f_smooth"]
-    for i in range(3):
-        moved[i] += r[i]
-        w_smooth[i] += smooth * (w[i] - w_smooth[i])
-        f_smooth[i] += smooth * (f[i] - f_smooth[i])
-    decay = work["decay"]
-    bg, ba, sg, sa = s["bg"], s["ba"], s["sg"], s["sa"]
-    for i in range(3):
-        bg[i] *= decay[9 + i]
-        ba[i] *= decay[12 + i]
-        if cfg["states"] == 21:
-            sg[i] *= decay[15 + i]
-            sa[i] *= decay[18 + i]
-    s["t"] = t
-
-
-@njit(cache=True)
-def _emit_solution(s, work, status, log_t, rows, counts):
-    """Append the solution at the filter's time, in local axes."""
-    nav = s["nav"]
-    r, v, C, P = nav["r"], nav["v"], nav["C"], s["P"]
-    u, M, N = work["axes"], work["M"], work["N"]
-    row = rows[counts[0]]
-    counts[0] += 1
-    row["t"] = s["t"]
-    row["log_t"] = log_t
-    row["status"] = status
-    enu_axes(r[0], r[1], r[2], u)
-    e, nn, up = rotate3(u, v[0], v[1], v[2])
-    row["v_enu"][0] = e
-    row["v_enu"][1] = nn
-    row["v_enu"][2] = up
-    # C_b_n: rows north, east, down.
-    for j in range(3):
-        M[0, j] = u[1, 0] * C[0, j] + u[1, 1] * C[1, j] + u[1, 2] * C[2, j]
-        M[1, j] = u[0, 0] * C[0, j] + u[0, 1] * C[1, j] + u[0, 2] * C[2, j]
-        M[2, j] = -(u[2, 0] * C[0, j] + u[2, 1] * C[1, j] + u[2, 2] * C[2, j])
-    roll, pitch, heading = euler_from_matrix(M)
-    row["attitude"][0] = roll
-    row["attitude"][1] = pitch
-    row["attitude"][2] = heading
-    e0, e1, e2 = rotate3_back(C, 0.0, 0.0, EARTH_RATE_RAD_S)
-    w_raw, bg, sg = s["w_raw"], s["bg"], s["sg"]
-    row["w_eb"][0] = (w_raw[0] - bg[0]) / (1.0 + sg[0]) - e0
-    row["w_eb"][1] = (w_raw[1] - bg[1]) / (1.0 + sg[1]) - e1
-    row["w_eb"][2] = (w_raw[2] - bg[2]) / (1.0 + sg[2]) - e2
-    for i in range(3):
-        row["r"][i] = r[i]
-    _local_block(P, POSITION, u, N)
-    row["cov"][0] = N[0, 0]
-    row["cov"][1] = N[0, 1]
-    row["cov"][2] = N[0, 2]
-    row["cov"][3] = N[1, 1]
-    row["cov"][4] = N[1, 2]
-    row["cov"][5] = N[2, 2]
-    _local_block(P, VELOCITY, u, N)
-    for i in range(3):
-        row["v_std"][i] = sqrt(max(0.0, N[i, i]))
-    _local_block(P, ATTITUDE, u, N)
-    for i in range(3):
-        row["a_std"][i] = sqrt(max(0.0, N[i, i]))
-    s["emitted_t"] = s["t"]
-
-
-@njit(cache=True)
-def _local_block(P, offset, u, out):
-    """U P u' of the (3, 3) block at `offset` into `out`."""
-    for i in range(3):
-        for j in range(i, 3):
-            total = 0.0
-            for a in range(3):
-                for b in range(3):
-                    total += u[i, a] * P[offset + a, offset + b] * u[j, b]
-            out[i, j] = total
-            out[j, i] = total
-
-
-@njit(cache=True)
-def _emit_epoch(s, cfg, log_t, rows, covariances, counts):
-    """Append the whole state and the upper triangle of its covariance."""
-    nav = s["nav"]
-    row = rows[counts[1]]
-    triangle = covariances[counts[1]]
-    counts[1] += 1
-    row["t"] = s["t"]
-    row["log_t"] = log_t
-    for i in range(3):
-        row["r"][i] = nav["r"][i]
-        row["v"][i] = nav["v"][i]
-        row["bg"][i] = s["bg"][i]
-        row["ba"][i] = s["ba"][i]
-        row["sg"][i] = s["sg"][i]
-        row["sa"][i] = s["sa"][i]
-    for i in range(4):
-        row["q"][i] = nav["q"][i]
-    row["mount"][0] = 0.0
-    row["mount"][1] = s["mount"][0]
-    row["mount"][2] = s["mount"][1]
-    for i in range(3):
-        row["point"][i] = s["point"][i]
-    row["squat"] = s["squat"]
-    n = state_count(cfg)
-    k = 0
-    P = s["P"]
-    for i in range(n):
-        for j in range(i, n):
-            triangle[k] = P[i, j]
-            k += 1
-
-
-@njit(cache=True)
-def _use_fix(s, cfg, work, fix, log_t, out):
+def _use_fix(
+    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Array, ...]
+) -> None:
     """Update with one fix at the filter's own time."""
     solutions, epochs, covariances, innovations, events, counts = out
     t = fix["t"]
-    _remove_sensor_errors(s, work)
+    remove_sensor_errors(s, work)
     force = cfg["rejections"] > 0 and s["rejected"] >= cfg["rejections"]
     used = position_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     if used:
@@ -243,12 +67,14 @@ def _use_fix(s, cfg, work, fix, log_t, out):
     if fix["has_v"] == 1 and cfg["use_velocity"] == 1:
         velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     mark_epoch(s, fix)
-    _emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
-    _emit_epoch(s, cfg, log_t, epochs, covariances, counts)
+    emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
+    emit_epoch(s, cfg, log_t, epochs, covariances, counts)
 
 
 @njit(cache=True)
-def _constrain(s, cfg, work, t, log_t, out):
+def _constrain(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Array, ...]
+) -> None:
     """Stops and non-holonomic updates at an inertial sample."""
     _, _, _, innovations, events, counts = out
     interval = cfg["stop_interval"]
@@ -278,13 +104,22 @@ def _constrain(s, cfg, work, t, log_t, out):
 
 
 @njit(cache=True)
-def _finite(a):
+def _finite(a: Array) -> bool:
     total = a[0] + a[1] + a[2]
     return total - total == 0.0
 
 
 @njit(cache=True)
-def _take_fixes(s, cfg, work, fixes, first, t, log_t, out):
+def _take_fixes(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    fixes: Array,
+    first: int,
+    t: int,
+    log_t: int,
+    out: tuple[Array, ...],
+) -> int:
     """Use every fix that is known by now and valid up to `t`; the number of the next one."""
     solutions, _, _, _, events, counts = out
     k = first
@@ -305,8 +140,8 @@ def _take_fixes(s, cfg, work, fixes, first, t, log_t, out):
                 mark_epoch(s, fix)
                 s["stop_last"] = fix["t"]
                 s["nhc_last"] = fix["t"]
-                _emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
-                _emit_epoch(s, cfg, log_t, out[1], out[2], counts)
+                emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
+                emit_epoch(s, cfg, log_t, out[1], out[2], counts)
             continue
         if fix["t"] < s["t"]:
             late = (s["t"] - fix["t"]) * 1e-9
@@ -314,17 +149,29 @@ def _take_fixes(s, cfg, work, fixes, first, t, log_t, out):
             continue
         if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
             # The last word before help arrives: this is where drift is read off.
-            _emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
-        _advance(s, cfg, work, fix["t"])
+            emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
+        advance(s, cfg, work, fix["t"])
         _use_fix(s, cfg, work, fix, log_t, out)
     return k
 
 
 @njit(cache=True)
 def run_block(
-    state, config, scratch, imu_t, imu_log_t, imu_w, imu_f, fixes,
-    solutions, epochs, covariances, innovations, events, counts,
-):  # fmt: skip
+    state: Array,
+    config: Array,
+    scratch: Array,
+    imu_t: Array,
+    imu_log_t: Array,
+    imu_w: Array,
+    imu_f: Array,
+    fixes: Array,
+    solutions: Array,
+    epochs: Array,
+    covariances: Array,
+    innovations: Array,
+    events: Array,
+    counts: Array,
+) -> int:
     """Carry the filter over a block.
 
     Parameters
@@ -391,7 +238,7 @@ def run_block(
         if s["in_outage"] == 0 and since > cfg["outage_limit"]:
             s["in_outage"] = 1
             record_event(events, counts, t, log_t, EVENT_OUTAGE_BEGIN, since, NOTE_FIX)
-        _advance(s, cfg, work, t)
+        advance(s, cfg, work, t)
         if not aligning:
             push_sample(s, w_raw, f_raw)
         _constrain(s, cfg, work, t, log_t, out)
@@ -399,5 +246,5 @@ def run_block(
         if slot > s["emitted_slot"]:
             s["emitted_slot"] = slot
             status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
-            _emit_solution(s, work, status, log_t, solutions, counts)
+            emit_solution(s, work, status, log_t, solutions, counts)
     return taken

@@ -14,19 +14,17 @@ local north-east-down, `l` local east-north-up.
 * A correction is always truth minus estimate, so that feedback is an addition.
 """
 
-import numpy as np
 from numba import njit
 
 from replay.kernels.elementary import asin, atan2, cos, sin, sincos, sqrt
-
-Array = np.ndarray
+from replay.kernels.types import Array
 
 # Below this half-angle the series of sin(x)/x to x^10 is exact to the last bit or two.
 _SERIES_HALF_ANGLE_RAD = 0.25
 
 
 @njit(cache=True)
-def half_angle_terms(angle_squared):
+def half_angle_terms(angle_squared: float) -> tuple[float, float]:
     """cos(a/2) and sin(a/2)/a of a rotation angle whose square is given (rad^2)."""
     u = 0.25 * angle_squared
     if u < _SERIES_HALF_ANGLE_RAD * _SERIES_HALF_ANGLE_RAD:
@@ -45,7 +43,7 @@ def half_angle_terms(angle_squared):
 
 
 @njit(cache=True)
-def quaternion_from_vector(x, y, z, out):
+def quaternion_from_vector(x: float, y: float, z: float, out: Array) -> None:
     """Quaternion of a rotation vector (rad) into `out` (4,)."""
     c, s = half_angle_terms(x * x + y * y + z * z)
     out[0] = c
@@ -55,7 +53,7 @@ def quaternion_from_vector(x, y, z, out):
 
 
 @njit(cache=True)
-def quaternion_multiply(p, q, out):
+def quaternion_multiply(p: Array, q: Array, out: Array) -> None:
     """Hamilton product p q into `out`, which may be neither p nor q."""
     out[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
     out[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
@@ -64,7 +62,7 @@ def quaternion_multiply(p, q, out):
 
 
 @njit(cache=True)
-def quaternion_normalize(q):
+def quaternion_normalize(q: Array) -> None:
     """Scale `q` to length one in place."""
     scale = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     for i in range(4):
@@ -72,7 +70,7 @@ def quaternion_normalize(q):
 
 
 @njit(cache=True)
-def matrix_from_quaternion(q, out):
+def matrix_from_quaternion(q: Array, out: Array) -> None:
     """Matrix (3, 3) of a unit quaternion into `out`."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     out[0, 0] = w * w + x * x - y * y - z * z
@@ -87,7 +85,7 @@ def matrix_from_quaternion(q, out):
 
 
 @njit(cache=True)
-def quaternion_from_matrix(C, out):
+def quaternion_from_matrix(C: Array, out: Array) -> None:
     """Unit quaternion of a rotation matrix, by the largest of the four components."""
     trace = C[0, 0] + C[1, 1] + C[2, 2]
     if trace >= C[0, 0] and trace >= C[1, 1] and trace >= C[2, 2]:
@@ -122,7 +120,7 @@ def quaternion_from_matrix(C, out):
 
 
 @njit(cache=True)
-def matrix_from_euler(roll, pitch, heading, out):
+def matrix_from_euler(roll: float, pitch: float, heading: float, out: Array) -> None:
     """C_b_n (3, 3) of roll, pitch, heading (rad) into `out` (Groves 2e, eq. 2.24)."""
     sr, cr = sincos(roll)
     sp, cp = sincos(pitch)
@@ -139,7 +137,7 @@ def matrix_from_euler(roll, pitch, heading, out):
 
 
 @njit(cache=True)
-def euler_from_matrix(C):
+def euler_from_matrix(C: Array) -> tuple[float, float, float]:
     """Roll, pitch, heading (rad) of C_b_n, heading in [0, 2 pi)."""
     s = -C[2, 0]
     if s > 1.0:
@@ -153,7 +151,7 @@ def euler_from_matrix(C):
 
 
 @njit(cache=True)
-def multiply3(A, B, out):
+def multiply3(A: Array, B: Array, out: Array) -> None:
     """Product of two (3, 3) matrices into `out`, which may be neither."""
     for i in range(3):
         for j in range(3):
@@ -161,7 +159,7 @@ def multiply3(A, B, out):
 
 
 @njit(cache=True)
-def rotate3(C, x, y, z):
+def rotate3(C: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """C times a vector, as three numbers."""
     return (
         C[0, 0] * x + C[0, 1] * y + C[0, 2] * z,
@@ -171,7 +169,7 @@ def rotate3(C, x, y, z):
 
 
 @njit(cache=True)
-def rotate3_back(C, x, y, z):
+def rotate3_back(C: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Transpose of C times a vector, as three numbers."""
     return (
         C[0, 0] * x + C[1, 0] * y + C[2, 0] * z,
@@ -181,6 +179,8 @@ def rotate3_back(C, x, y, z):
 
 
 @njit(cache=True)
-def cross3(a0, a1, a2, b0, b1, b2):
+def cross3(
+    a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
+) -> tuple[float, float, float]:
     """Vector product, as three numbers."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0

@@ -17,6 +17,7 @@ from replay.kernels.rotation import (
     quaternion_normalize,
     rotate3,
 )
+from replay.kernels.types import Array, Record
 
 # Position, velocity, attitude and the increments of the interval before.
 NAVIGATION_DTYPE = np.dtype(
@@ -36,7 +37,17 @@ NAVIGATION_DTYPE = np.dtype(
 
 
 @njit(cache=True)
-def mechanize(nav, tx, ty, tz, ux, uy, uz, dt, scratch):
+def mechanize(
+    nav: Record,
+    tx: float,
+    ty: float,
+    tz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    dt: float,
+    scratch: Array,
+) -> None:
     """Carry position, velocity and attitude over one interval.
 
     Parameters

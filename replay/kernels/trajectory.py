@@ -5,8 +5,7 @@ goes from one value to another along a septic smoothstep, so that rates are thre
 times and values four times continuously differentiable. Velocity and attitude are
 closed functions of them; the position is the integral of the velocity in ECEF
 (Runge-Kutta of order 4), and inertial increments are integrals of the exact
-specific force and angular rate (Gauss-Legendre of order 6). At the end stand the
-random sequences that simulated sensors add: they too must be the same everywhere.
+specific force and angular rate (Gauss-Legendre of order 6).
 """
 
 from typing import Any
@@ -22,7 +21,7 @@ from replay.kernels.earth import (
     gravity,
     surface_normal,
 )
-from replay.kernels.elementary import log, sincos, sqrt
+from replay.kernels.elementary import sincos, sqrt
 from replay.kernels.rotation import (
     euler_from_matrix,
     matrix_from_euler,
@@ -30,6 +29,7 @@ from replay.kernels.rotation import (
     rotate3,
     rotate3_back,
 )
+from replay.kernels.types import Array, Record
 
 # One piece of the motion. The three quantities are speed (m/s), heading (rad, clockwise
 # from north) and grade (rad, up); rates are theirs per second.
@@ -79,7 +79,7 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @njit(cache=True)
-def _piece_at(pieces, t, guess):
+def _piece_at(pieces: Array, t: float, guess: int) -> int:
     """Number of the piece in which a time (s) lies, looking onward from a guess."""
     k = guess
     while k + 1 < pieces.shape[0] and pieces[k + 1]["start"] <= t:
@@ -88,7 +88,7 @@ def _piece_at(pieces, t, guess):
 
 
 @njit(cache=True)
-def _profile(piece, t, i):
+def _profile(piece: Record, t: float, i: int) -> tuple[float, float, float]:
     """Value, first and second derivative of quantity `i` at a time (s) of a piece."""
     elapsed = t - piece["start"]
     T = piece["duration"]
@@ -105,7 +105,7 @@ def _profile(piece, t, i):
 
 
 @njit(cache=True)
-def _move(piece, t, lean, m):
+def _move(piece: Record, t: float, lean: Array, m: Record) -> None:
     """Velocity, its derivative and attitude angles with their rates, in local axes.
 
     `lean` holds roll per lateral and pitch per forward acceleration (rad per m/s^2):
@@ -132,7 +132,7 @@ def _move(piece, t, lean, m):
 
 
 @njit(cache=True)
-def _attitude(m):
+def _attitude(m: Record) -> None:
     """Body to north-east-down, and the angular rate relative to those axes, in body axes."""
     angle, rate = m["angle"], m["angle_rate"]
     matrix_from_euler(angle[0], angle[1], angle[2], m["C"])
@@ -146,7 +146,7 @@ def _attitude(m):
 
 
 @njit(cache=True)
-def _local_frame(x, v):
+def _local_frame(x: Array, v: Array) -> tuple[float, float, float, float, float, float, float]:
     """Sine, cosine of latitude and longitude, and the transport rate (rad/s; east, north, up)."""
     sin_lat, cos_lat, sin_lon, cos_lon, height = surface_normal(x[0], x[1], x[2])
     k = 1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat
@@ -158,7 +158,7 @@ def _local_frame(x, v):
 
 
 @njit(cache=True)
-def _sense(m):
+def _sense(m: Record) -> None:
     """Specific force and angular rate at `m["x"]`, body axes (Groves 2e, eq. 5.53 for f)."""
     x, v, a, f, w, C = m["x"], m["v"], m["a"], m["f"], m["w"], m["C"]
     sin_lat, cos_lat, sin_lon, cos_lon, te, tn, tu = _local_frame(x, v)
@@ -181,7 +181,7 @@ def _sense(m):
 
 
 @njit(cache=True)
-def _to_ecef(x, y, z, v, out):
+def _to_ecef(x: float, y: float, z: float, v: Array, out: Array) -> None:
     """Local velocity (east, north, up) at an ECEF position, in ECEF axes."""
     sin_lat, cos_lat, sin_lon, cos_lon, _ = surface_normal(x, y, z)
     horizontal = cos_lat * v[2] - sin_lat * v[1]
@@ -191,7 +191,17 @@ def _to_ecef(x, y, z, v, out):
 
 
 @njit(cache=True)
-def _step(pieces, first, lean, t, h, r, m, k, out):
+def _step(
+    pieces: Array,
+    first: int,
+    lean: Array,
+    t: float,
+    h: float,
+    r: Array,
+    m: Record,
+    k: Array,
+    out: Array,
+) -> None:
     """Carry a position over `h` seconds; velocities at both ends stay in `k[0]` and `k[4]`.
 
     Parameters
@@ -226,7 +236,15 @@ def _step(pieces, first, lean, t, h, r, m, k, out):
 
 
 @njit(cache=True)
-def sense_motion(pieces, lean, step, positions, rates, forces, motion):
+def sense_motion(
+    pieces: Array,
+    lean: Array,
+    step: float,
+    positions: Array,
+    rates: Array,
+    forces: Array,
+    motion: Array,
+) -> None:
     """Positions on a grid of equal steps, and mean rate and specific force over each step.
 
     Parameters
@@ -274,7 +292,15 @@ def sense_motion(pieces, lean, step, positions, rates, forces, motion):
 
 
 @njit(cache=True)
-def poses_at(pieces, lean, step, positions, times, motion, poses):
+def poses_at(
+    pieces: Array,
+    lean: Array,
+    step: float,
+    positions: Array,
+    times: Array,
+    motion: Array,
+    poses: Array,
+) -> None:
     """Poses at any times, from the grid of :func:`sense_motion`.
 
     Parameters
@@ -328,7 +354,14 @@ def new_motion() -> np.ndarray[Any, Any]:
 
 
 @njit(cache=True)
-def antenna_fixes(poses, lever, position_errors, velocity_errors, positions, velocities):
+def antenna_fixes(
+    poses: Array,
+    lever: Array,
+    position_errors: Array,
+    velocity_errors: Array,
+    positions: Array,
+    velocities: Array,
+) -> None:
     """Position and velocity of an antenna, with errors given in local axes.
 
     Parameters
@@ -360,44 +393,3 @@ def antenna_fixes(poses, lever, position_errors, velocity_errors, positions, vel
         velocities[n, 0] = v[0] + b0 + d0
         velocities[n, 1] = v[1] + b1 + d1
         velocities[n, 2] = v[2] + b2 + d2
-
-
-@njit(cache=True)
-def normals(uniforms, out):
-    """Standard normal numbers from uniform ones (Box and Muller 1958).
-
-    Parameters
-    ----------
-    uniforms : float64 array (n, 2)
-        In [0, 1).
-    out : float64 array (n, 2)
-        Written.
-    """
-    for n in range(uniforms.shape[0]):
-        radius = sqrt(-2.0 * log(1.0 - uniforms[n, 0]))
-        s, c = sincos(6.283185307179586 * uniforms[n, 1])
-        out[n, 0] = radius * c
-        out[n, 1] = radius * s
-
-
-@njit(cache=True)
-def gauss_markov(sigma, decay, drive, series):
-    """First-order Gauss-Markov sequences, in place of the standard normal numbers they grow from.
-
-    Parameters
-    ----------
-    sigma : float
-        Stationary standard deviation; the first row is drawn from it.
-    decay : float
-        Correlation of neighbours.
-    drive : float
-        Square root of one minus its square.
-    series : float64 array (n, k)
-        Standard normal numbers; overwritten by k independent sequences.
-    """
-    for j in range(series.shape[1]):
-        value = series[0, j]
-        series[0, j] = sigma * value
-        for n in range(1, series.shape[0]):
-            value = decay * value + drive * series[n, j]
-            series[n, j] = sigma * value

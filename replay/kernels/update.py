@@ -26,16 +26,17 @@ from replay.kernels.rotation import (
     quaternion_normalize,
     rotate3,
 )
+from replay.kernels.types import Array, Record
 
 
 @njit(cache=True)
-def state_count(cfg):
+def state_count(cfg: Record) -> int:
     """Number of error states of a configuration."""
     return cfg["states"] + 2 * cfg["mounting"] + 2 * cfg["lever"] + cfg["squat"]
 
 
 @njit(cache=True)
-def feed_back(s, cfg, dx, scratch):
+def feed_back(s: Record, cfg: Record, dx: Array, scratch: Array) -> None:
     """Add a correction (truth minus estimate) to the filter's state."""
     nav = s["nav"]
     r, v, q = nav["r"], nav["v"], nav["q"]
@@ -78,7 +79,18 @@ def feed_back(s, cfg, dx, scratch):
 
 
 @njit(cache=True)
-def record_innovation(rows, counts, t, log_t, kind, axis, z, s, r, accepted):
+def record_innovation(
+    rows: Array,
+    counts: Array,
+    t: int,
+    log_t: int,
+    kind: int,
+    axis: int,
+    z: float,
+    s: float,
+    r: float,
+    accepted: bool,
+) -> None:
     """Append one row to the innovations."""
     row = rows[counts[2]]
     row["t"] = t
@@ -93,7 +105,9 @@ def record_innovation(rows, counts, t, log_t, kind, axis, z, s, r, accepted):
 
 
 @njit(cache=True)
-def record_event(rows, counts, t, log_t, kind, value, note):
+def record_event(
+    rows: Array, counts: Array, t: int, log_t: int, kind: int, value: float, note: int
+) -> None:
     """Append one row to the events; beyond the room that there is, only count it."""
     if counts[3] < rows.shape[0]:
         row = rows[counts[3]]
@@ -108,7 +122,21 @@ def record_event(rows, counts, t, log_t, kind, value, note):
 
 
 @njit(cache=True)
-def update(s, cfg, work, k, count, gate, force, kind, axis, t, log_t, innovations, counts):
+def update(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    k: int,
+    count: int,
+    gate: float,
+    force: bool,
+    kind: int,
+    axis: int,
+    t: int,
+    log_t: int,
+    innovations: Array,
+    counts: Array,
+) -> bool:
     """Use the measurement that stands in `work`: H, index, z, R.
 
     Parameters
@@ -171,7 +199,7 @@ def update(s, cfg, work, k, count, gate, force, kind, axis, t, log_t, innovation
 
 
 @njit(cache=True)
-def fill_covariance(R, c, scale, floor):
+def fill_covariance(R: Array, c: Array, scale: float, floor: Array) -> None:
     """(3, 3) from an upper triangle, scaled, with the squares of `floor` (3) on the diagonal."""
     k = scale * scale
     R[0, 0] = k * c[0] + floor[0] * floor[0]
@@ -186,7 +214,7 @@ def fill_covariance(R, c, scale, floor):
 
 
 @njit(cache=True)
-def diagonal(R, a, b, c):
+def diagonal(R: Array, a: float, b: float, c: float) -> None:
     """(3, 3) diagonal matrix of three variances."""
     for i in range(3):
         for j in range(3):

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from replay.kernels import elementary
-from replay.kernels.trajectory import gauss_markov
-from replay.kernels.trajectory import normals as normals_of_uniforms
+from replay.kernels.noise import gauss_markov
+from replay.kernels.noise import normals as normals_of_uniforms
 
 Floats = npt.NDArray[np.float64]
 

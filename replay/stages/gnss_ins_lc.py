@@ -122,7 +122,8 @@ class GnssInsLoose:
 
     def restore(self, state: LooseState, data: bytes) -> LooseState:
         """State of a dump."""
-        return dataclasses.replace(state, **restore_arrays(data, _dump_types()))
+        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
+        return dataclasses.replace(state, **arrays)
 
     def _run(self, state: LooseState, ready: int) -> Outputs:
         samples, fixes = ready, len(state.pending)

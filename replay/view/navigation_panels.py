@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from replay.evaluate.errors_enu import Errors, attitude_errors, position_errors, velocity_errors
 from replay.log.columns import Columns
-from replay.view.errors_enu import Errors, attitude_errors, position_errors, velocity_errors
 from replay.view.fields import doubles
 from replay.view.frame import Floats, symmetric
 from replay.view.gather import Run, RunData

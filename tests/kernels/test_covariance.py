@@ -16,6 +16,7 @@ def spd(rng, n):
 
 def transition(n, r, C, f_e, f_b, w_b, dt, decay):
     """Dense transition matrix, written down from the equations of the module."""
+
     def skew(v):
         return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
@@ -106,9 +107,9 @@ def test_the_transition_matrix_is_the_derivative_of_the_mechanisation():
     left = []
     for dt in (0.2, 0.1, 0.05):
         found = derivative_of_mechanisation(nav, w_raw, f_raw, dt)
-        expected = transition(
-            21, np.array(nav["r"]), C, C @ f_raw, f_raw, w_raw, dt, np.ones(21)
-        )[:9]
+        expected = transition(21, np.array(nav["r"]), C, C @ f_raw, f_raw, w_raw, dt, np.ones(21))[
+            :9
+        ]
         left.append(np.abs(found - expected).max(axis=1))
     for coarse, fine in itertools.pairwise(left):
         ratio = coarse / fine

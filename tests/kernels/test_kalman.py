@@ -67,7 +67,7 @@ def test_what_is_not_definite_is_refused():
     before = P.copy()
     ok, dx = update(P, np.eye(3, 4), np.arange(3), np.diag([1.0, -1.0, 1.0]), np.ones(3))
     assert not ok
-    assert (P == before).all()
+    assert (before == P).all()
     assert (dx == 0.0).all()
 
 

@@ -8,8 +8,16 @@ from replay.kernels import constraints, gnss_update, records, update
 from replay.schemas import filter_pb2, solution_pb2
 from tests.kernels.test_strapdown import start
 
-SIZES = np.array(
-    [1.0] * 3 + [0.1] * 3 + [1e-5] * 3 + [1e-4] * 3 + [1e-3] * 3 + [1e-4] * 6 + [1e-5] * 2 + [0.01] * 2 + [1e-5]
+SIZES = np.array(  # of position, velocity, attitude, biases, scale factors, those of the vehicle
+    [1.0] * 3
+    + [0.1] * 3
+    + [1e-5] * 3
+    + [1e-4] * 3
+    + [1e-3] * 3
+    + [1e-4] * 6
+    + [1e-5] * 2
+    + [0.01] * 2
+    + [1e-5]
 )
 LEVER = [0.8, -0.4, -1.2]
 W_RAW = np.array([0.05, -0.1, 0.4])
@@ -20,7 +28,8 @@ WINDOW = 0.25
 def config(**values):
     cfg = np.zeros(1, dtype=records.CONFIG_DTYPE)
     defaults = {
-        "states": 21, "mounting": 1, "lever": 1, "squat": 1, "imu_interval": 0.01, "stop_interval": 0.1,
+        "states": 21, "mounting": 1, "lever": 1, "squat": 1,
+        "imu_interval": 0.01, "stop_interval": 0.1,
         "nhc_right_sigma": 0.1, "nhc_down_sigma": 0.1, "zero_velocity_sigma": 0.1,
         "zero_rate_sigma": 0.1, "position_scale": 1.0, "velocity_scale": 1.0,
         "nhc_speed": 0.1, "position_floor": 0.0,
@@ -125,7 +134,9 @@ def test_mean_velocity_over_a_window():
 
     def measure(s, cfg, work, rows, counts, error):
         # What the velocity was over the window, if the error grew as the error model says.
-        acceleration = -np.cross(s["nav"]["f_e"], error[6:9]) - np.array(s["nav"]["C"]) @ error[12:15]
+        acceleration = (
+            -np.cross(s["nav"]["f_e"], error[6:9]) - np.array(s["nav"]["C"]) @ error[12:15]
+        )
         mean_error = error[3:6] - 0.5 * WINDOW * acceleration
         base, _, _ = state_with(np.zeros(26))
         s["moved"] = WINDOW * (base["nav"]["v"] + mean_error)

@@ -71,9 +71,7 @@ def coning(count_per_turn: int, turns: int) -> float:
     dt = 1.0 / (5.0 * count_per_turn)
 
     def attitude(t):
-        return Rotation.from_rotvec(
-            np.array([0.0, np.cos(rate * t), np.sin(rate * t)]) * cone
-        )
+        return Rotation.from_rotvec(np.array([0.0, np.cos(rate * t), np.sin(rate * t)]) * cone)
 
     nav = start()
     # Free of the Earth: measure against the same motion composed with the Earth's turning.

@@ -297,6 +297,7 @@ def _filter(
                 "gyro_scale_factor": wobble * sigma[:, 15:18],
                 "accel_scale_factor": wobble * sigma[:, 18:21],
                 "mounting_angles_rad": np.zeros((n, 3)),
+                "squat_rad_s2_m": np.zeros(n),
                 "non_slip_point_body_m": np.tile([-1.2, 0.0, 0.8], (n, 1)),
             },
         )
