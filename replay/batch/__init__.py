@@ -1,0 +1,1 @@
+"""Many runs: what recordings gave before, and whether they still do."""

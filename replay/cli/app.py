@@ -49,7 +49,7 @@ def show_error(error: ReplayError) -> None:
 def main() -> None:
     """Entry point of the console command."""
     # Commands register themselves on import; libraries are imported when a command runs.
-    from replay.cli import logs, looks, runs  # noqa: F401
+    from replay.cli import baselines, logs, looks, runs  # noqa: F401
 
     try:
         app()

@@ -2,7 +2,8 @@
 
 At rest the mean specific force gives roll and pitch and the mean rate the gyro
 bias; attitude then follows the gyros in a level frame of unknown heading until
-the vehicle drives fast and straight enough for the course to be its heading. A
+the vehicle drives fast and straight enough for the course to be its heading, or the
+opposite of it, as the push since the rest tells. A
 log that begins in motion is levelled with the acceleration that GNSS sees.
 """
 
@@ -45,6 +46,7 @@ from replay.kernels.types import Array, Record
 from replay.kernels.update import diagonal, fill_covariance, record_event, state_count
 
 _GRAVITY_M_S2 = 9.80665
+_HALF_TURN_RAD = 3.141592653589793
 _TURN_WINDOW_S = 0.2  # long enough to average an engine's shaking
 _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
@@ -102,6 +104,9 @@ def align_sample(
         s["rest_count"] = 0
         for i in range(6):
             s["rest_sum"][i] = 0.0
+    if still:
+        for i in range(3):
+            s["align_v"][i] = 0.0
     if s["mode"] == LEVELLED and not still:
         bg = s["bg"]
         q, scratch = s["align_q"], work["q"]
@@ -112,6 +117,14 @@ def align_sample(
         for i in range(4):
             q[i] = scratch[1, i]
         quaternion_normalize(q)
+        # Gravity is what the specific force was at rest, so that the bias goes with it.
+        M, v = work["M"], s["align_v"]
+        matrix_from_quaternion(q, M)
+        a0, a1, a2 = rotate3(M, f[0], f[1], f[2])
+        rest = s["rest_f"]
+        v[0] += a0 * dt
+        v[1] += a1 * dt
+        v[2] += (a2 + sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2])) * dt
 
 
 @njit(cache=True)
@@ -158,6 +171,9 @@ def align_fix(
     if s["mode"] == LEVELLED:
         matrix_from_quaternion(s["align_q"], M)
         roll, pitch, heading = euler_from_matrix(M)
+        v = s["align_v"]
+        if M[0, 0] * v[0] + M[1, 0] * v[1] + M[2, 0] * v[2] < 0.0:
+            course += _HALF_TURN_RAD  # it set out backward
         turned = course - heading
         # The mean rate at rest holds the Earth's rate: take it out with the attitude of then.
         matrix_from_quaternion(s["rest_q"], M)

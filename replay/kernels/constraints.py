@@ -167,7 +167,7 @@ def non_holonomic_update(
     b0 += c0
     b1 += c1
     b2 += c2
-    if b0 < cfg["nhc_speed"]:
+    if abs(b0) < cfg["nhc_speed"]:
         return False
     turning = cfg["nhc_rate_sigma"] * sqrt(w0 * w0 + w1 * w1 + w2 * w2)
     right = cfg["nhc_right_sigma"]

@@ -120,6 +120,7 @@ STATE_DTYPE: Final = np.dtype(
         ("rest_q", "<f8", 4),  # body at rest to a level frame of unknown heading
         ("rest_f", "<f8", 3),  # m/s^2, mean specific force at rest, body
         ("align_q", "<f8", 4),  # body now to the same frame
+        ("align_v", "<f8", 3),  # m/s in the same frame, since the last rest
         ("align_fix_t", "<i8"),  # ns of the fix before, minus one where there is none
         ("align_fix_r", "<f8", 3),  # m, ECEF
         ("align_speed", "<f8"),  # m/s at the fix before, minus one where unknown
