@@ -20,9 +20,9 @@ from replay.engine.floating_point import require_ieee_arithmetic
 from replay.engine.graph import Node, bind
 from replay.engine.job import Job
 from replay.engine.pipelines import find_pipeline
-from replay.engine.sink import Sink, announce_as_recorded, recorded_depth
+from replay.engine.sink import Sink, announce_as_recorded
 from replay.engine.trace import StageTrace
-from replay.errors import LossReport, UsageError
+from replay.errors import CorruptLogError, LossReport, UsageError
 from replay.log import codec
 from replay.log.columns import Columns, Ragged
 from replay.log.digest import ChannelDigest
@@ -145,7 +145,7 @@ class Replayer:
         ]
 
     def _depths(self) -> dict[str, int]:
-        return {topic: recorded_depth(info) for topic, info in self.recorded.items()}
+        return {topic: info.depth for topic, info in self.recorded.items()}
 
     def _start(self, node: Node) -> Any:
         topics = {**node.inputs, **node.outputs}
@@ -262,17 +262,50 @@ class Replayer:
             trace.restore(blob[8 : 8 + length])
             self.states[index] = node.stage.restore(self.states[index], blob[8 + length :])
         topics = list(resume.channels)
+        counts = dict.fromkeys(topics, 0)
+        copied = [StageTrace(node) for node in self.nodes]
         for batch in resume.batches(topics, decode=[], payloads=topics, end_ns=at_ns + 1):
             kept = {topic: rows for topic, rows in batch.items() if len(rows)}
             if not kept:
                 continue
             if self._first_ns < 0:
                 self._first_ns = min(int(rows.log_time_ns[0]) for rows in kept.values())
-            self._trace_rows += len(kept[TRACE.topic]) if TRACE.topic in kept else 0
-            self._checkpoint_rows += len(kept[CHECKPOINT.topic]) if CHECKPOINT.topic in kept else 0
+            for topic, rows in kept.items():
+                counts[topic] += len(rows)
+            for trace in copied:
+                trace.update(kept)
             sink.write(kept)
+        self._trace_rows = counts[TRACE.topic]
+        self._checkpoint_rows = counts[CHECKPOINT.topic]
+        self._require_whole(resume, at_ns, counts, copied)
         self._last_ns = at_ns
         return at_ns + 1
+
+    def _require_whole(
+        self, resume: LogReader, at_ns: int, counts: Mapping[str, int], copied: list[StageTrace]
+    ) -> None:
+        """Refuse an earlier run that lost rows before its last checkpoint.
+
+        Recovery leaves out a damaged chunk; a checkpoint after the hole hides it.
+        """
+        expected = dict.fromkeys(self.recorded, 0)
+        for batch in self.reader.batches(
+            list(self.recorded), decode=[], start_ns=self.job.start_ns, end_ns=at_ns + 1
+        ):
+            for topic, rows in batch.items():
+                expected[topic] += len(rows)
+        every = self.job.checkpoint_every_s * time.NS_PER_S
+        expected[TRACE.topic] = sum(trace.step for trace in self.traces)
+        expected[CHECKPOINT.topic] = len(self.nodes) * ((at_ns - self._first_ns) // every)
+        holed = {topic for topic, count in expected.items() if counts.get(topic, 0) != count}
+        for found, saved in zip(copied, self.traces, strict=True):
+            holed |= {t for t, digest in found.digests.items() if digest != saved.digests[t]}
+        if holed:
+            raise CorruptLogError(
+                f"the earlier run lacks rows of {', '.join(sorted(holed))}",
+                where=f"{resume.path}, before its checkpoint at {time.to_text(at_ns)}",
+                mend="it was damaged before its end: run again without --resume",
+            )
 
     def _notes(self) -> tuple[str, ...]:
         return tuple(str(loss) for loss in self.reader.report.losses)

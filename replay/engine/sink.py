@@ -8,7 +8,6 @@ from typing import Protocol
 from replay.log.channel_info import ChannelInfo
 from replay.log.columns import Columns
 from replay.log.digest import ChannelDigest, Digester
-from replay.log.names import DEPTH_KEY
 
 
 class Sink(Protocol):
@@ -75,11 +74,6 @@ class DigestSink:
         return {topic: d.result() for topic, d in sorted(self._digesters.items())}
 
 
-def recorded_depth(info: ChannelInfo) -> int:
-    """Depth of a channel as its log holds it."""
-    return int(info.metadata.get(DEPTH_KEY, "0"))
-
-
 def announce_as_recorded(sink: Sink, topic: str, info: ChannelInfo) -> None:
     """Announce a channel that passes through untouched."""
     sink.add_raw_channel(
@@ -88,6 +82,6 @@ def announce_as_recorded(sink: Sink, topic: str, info: ChannelInfo) -> None:
         schema_encoding=info.schema_encoding,
         schema_data=info.schema_data,
         message_encoding=info.message_encoding,
-        depth=recorded_depth(info),
-        metadata={key: text for key, text in info.metadata.items() if key != DEPTH_KEY},
+        depth=info.depth,
+        metadata=info.metadata,
     )

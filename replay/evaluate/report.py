@@ -85,5 +85,6 @@ class Evaluation(msgspec.Struct, frozen=True, kw_only=True):
 
     def to_json_dict(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers, texts and None."""
-        plain: dict[str, Any] = msgspec.to_builtins(self)
+        # By way of JSON, so that a tuple is a list here as it is for those who read the file.
+        plain: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
         return plain
