@@ -28,6 +28,7 @@ from replay.kernels.records import (
     LEVELLED,
     RUNNING,
     WAITING,
+    WINDOW,
 )
 from replay.kernels.rotation import (
     cross3,
@@ -47,6 +48,7 @@ from replay.kernels.update import diagonal, fill_covariance, record_event, state
 
 _GRAVITY_M_S2 = 9.80665
 _HALF_TURN_RAD = 3.141592653589793
+_GUARD_BLOCKS = 2
 _TURN_WINDOW_S = 0.2  # long enough to average an engine's shaking
 _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
@@ -90,10 +92,13 @@ def align_sample(
     push_sample(s, w, f)
     still = is_still(s, cfg, work, False)
     if still:
+        # A sample of a little earlier: the first ones of a start pass for rest.
         total = s["rest_sum"]
-        for i in range(3):
-            total[i] += w[i]
-            total[3 + i] += f[i]
+        older = s["window"][
+            (s["window_head"] - 1 - _GUARD_BLOCKS * cfg["stop_block"] + WINDOW) % WINDOW
+        ]
+        for i in range(6):
+            total[i] += older[i]
         s["rest_count"] += 1
         if s["rest_count"] * cfg["imu_interval"] >= cfg["rest_time"]:
             _level(s, work)
