@@ -18,9 +18,9 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from replay.evaluate.outages import Span
 from replay.time import seconds_between
 from replay.view.frame import Floats
-from replay.view.outages import Outage
 from replay.view.palette import OUTAGE, TRUTH
 from replay.view.panels import Curve, Panel, Shape
 from replay.view.sink import Times
@@ -103,7 +103,7 @@ class Clock:
 def panels_chart(
     panels: Sequence[Panel],
     clock: Clock,
-    outages: Sequence[Outage],
+    outages: Sequence[Span],
     *,
     caption: str,
     columns: int | None = None,
@@ -115,7 +115,7 @@ def panels_chart(
     panels : sequence of Panel
         At least one.
     clock : Clock
-    outages : sequence of Outage
+    outages : sequence of Span
         Shaded.
     caption : str
         What is to be said; what was thinned is added.
@@ -181,7 +181,7 @@ class _Pen:
         return rows
 
 
-def _draw_panel(ax: Axes, item: Panel, pen: _Pen, outages: Sequence[Outage]) -> None:
+def _draw_panel(ax: Axes, item: Panel, pen: _Pen, outages: Sequence[Span]) -> None:
     clock = pen.clock
     for outage in outages:
         ax.axvspan(

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from replay import channels
+from replay.evaluate.outages import Span
 from replay.log.columns import Columns, concatenate
-from replay.view.outages import Outage, find_outages
+from replay.view.outages import find_outages
 from replay.view.uncertainty import Sigmas, join_sigmas, sigmas_of
 
 Batches = Iterable[Mapping[str, Columns]]
@@ -86,7 +87,7 @@ class RunData:
         In the order of their names.
     stats : mapping of topic to ChannelStats
         Every topic that had rows, in the order of topics.
-    outages : tuple of Outage
+    outages : tuple of Span
     metadata : mapping
         Metadata records of the log.
     """
@@ -96,7 +97,7 @@ class RunData:
     observations: Mapping[str, Columns]
     runs: tuple[Run, ...]
     stats: Mapping[str, ChannelStats]
-    outages: tuple[Outage, ...]
+    outages: tuple[Span, ...]
     metadata: Mapping[str, Mapping[str, str]]
 
     @property

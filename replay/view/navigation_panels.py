@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from replay.evaluate.errors_enu import Errors, attitude_errors, position_errors, velocity_errors
+from replay.evaluate.geometry import Floats, symmetric
 from replay.log.columns import Columns
 from replay.view.fields import doubles
-from replay.view.frame import Floats, symmetric
 from replay.view.gather import Run, RunData
 from replay.view.labels import ATTITUDE_ANGLES, BOUNDS, LOCAL_AXES, SIGMA
 from replay.view.palette import TRUTH, run_ink

@@ -2,39 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from collections.abc import Iterable, Mapping
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-GAP_INTERVALS: Final = 3.0  # one or two lost fixes are no outage
+from replay.evaluate.outages import GAP_INTERVALS, Span, cut_spans
+
 _FEWEST_FIXES: Final = 3
-
-
-@dataclasses.dataclass(frozen=True, slots=True, order=True)
-class Outage:
-    """A span without GNSS.
-
-    Attributes
-    ----------
-    start_ns, end_ns : int, GPS ns
-    cut : bool
-        True where the log's `replay.degrade` record says that it was cut on purpose.
-    """
-
-    start_ns: int
-    end_ns: int
-    cut: bool = False
 
 
 def find_outages(
     metadata: Mapping[str, Mapping[str, str]],
     fix_times_ns: Iterable[npt.NDArray[np.int64]],
     end_ns: int | None,
-) -> tuple[Outage, ...]:
+) -> tuple[Span, ...]:
     """Outages in the order of time.
 
     Parameters
@@ -48,15 +31,10 @@ def find_outages(
 
     Returns
     -------
-    tuple of Outage
+    tuple of Span
         A gap that a cut outage explains is not told twice.
     """
-    cut = [
-        Outage(int(item["start_ns"]), int(item["end_ns"]), cut=True)
-        for item in json.loads(metadata.get("replay.degrade", {}).get("json", "{}")).get(
-            "outages", []
-        )
-    ]
+    cut = list(cut_spans(metadata) or ())
     gaps = [
         gap
         for gap in _gaps(list(fix_times_ns), end_ns)
@@ -65,7 +43,7 @@ def find_outages(
     return tuple(sorted(cut + gaps))
 
 
-def _gaps(fix_times_ns: list[npt.NDArray[np.int64]], end_ns: int | None) -> list[Outage]:
+def _gaps(fix_times_ns: list[npt.NDArray[np.int64]], end_ns: int | None) -> list[Span]:
     times = np.unique(np.concatenate(fix_times_ns)) if fix_times_ns else np.empty(0, np.int64)
     if len(times) < _FEWEST_FIXES:
         return []
@@ -73,10 +51,10 @@ def _gaps(fix_times_ns: list[npt.NDArray[np.int64]], end_ns: int | None) -> list
     if end_ns is not None and end_ns > times[-1]:
         times = np.append(times, end_ns)
     wide = np.flatnonzero(np.diff(times) > limit)
-    return [Outage(int(times[i]), int(times[i + 1])) for i in wide]
+    return [Span(int(times[i]), int(times[i + 1])) for i in wide]
 
 
-def inside(times_ns: npt.NDArray[np.int64], outages: Iterable[Outage]) -> npt.NDArray[np.bool_]:
+def inside(times_ns: npt.NDArray[np.int64], outages: Iterable[Span]) -> npt.NDArray[np.bool_]:
     """Which times lie within an outage, ends included."""
     mask = np.zeros(len(times_ns), dtype=np.bool_)
     for outage in outages:

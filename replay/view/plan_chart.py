@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from replay.evaluate.outages import Span
 from replay.log.columns import Columns
 from replay.view.charts import Chart, draw
 from replay.view.fields import doubles
 from replay.view.frame import Floats, LocalFrame
 from replay.view.gather import RunData
-from replay.view.outages import Outage, inside
+from replay.view.outages import inside
 from replay.view.palette import OUTAGE, TRUTH, Ink, receiver_ink, run_ink
 from replay.view.sink import Times
 from replay.view.thinning import dot_stride
@@ -98,7 +99,7 @@ def _line(
             label=label)  # fmt: skip
 
 
-def _outages(ax: Axes, enu: Floats, times: Times, outages: Sequence[Outage]) -> None:
+def _outages(ax: Axes, enu: Floats, times: Times, outages: Sequence[Span]) -> None:
     for number, outage in enumerate(outages, start=1):
         rows = np.flatnonzero(inside(times, [outage]))
         if len(rows) == 0:

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
+from replay.evaluate.outages import Span
 from replay.time import to_datetime64
-from replay.view.outages import Outage, inside
+from replay.view.outages import inside
 from replay.view.palette import OUTAGE, TRUTH, Rgb
 from replay.view.panels import Curve, Panel, Shape
 
@@ -80,7 +81,7 @@ class Sink:
 
         self.columns(path, times_ns, make)
 
-    def panel(self, panel: Panel, root: str, outages: Sequence[Outage]) -> None:
+    def panel(self, panel: Panel, root: str, outages: Sequence[Span]) -> None:
         """All curves of a panel.
 
         Parameters
@@ -88,7 +89,7 @@ class Sink:
         panel : Panel
         root : str
             Path that the panel's key is put under.
-        outages : sequence of Outage
+        outages : sequence of Span
             Where curves that ask for it are drawn again in red.
         """
         for curve in panel.curves:

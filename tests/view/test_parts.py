@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from replay.errors import LogError, ReplayError
+from replay.evaluate.outages import Span
 from replay.log.columns import Columns, Ragged
 from replay.time import NS_PER_S
 from replay.view import picture
 from replay.view.about import manifest_of
 from replay.view.filter_panels import nis_of
-from replay.view.outages import Outage, find_outages, inside
+from replay.view.outages import find_outages, inside
 from replay.view.picture import render_png
 from replay.view.thinning import dot_stride, line_rows
 from replay.view.uncertainty import attitude_angle_sigmas, join_sigmas, sigmas_of
@@ -28,9 +29,9 @@ def test_gaps_are_outages_and_cut_ones_are_told_once() -> None:
     record = {"outages": [{"start_ns": 49 * S, "end_ns": 79 * S}]}
     found = find_outages({"replay.degrade": {"json": json.dumps(record)}}, [times], 160 * S)
     assert found == (
-        Outage(49 * S, 79 * S, cut=True),
-        Outage(119 * S, 140 * S),
-        Outage(149 * S, 160 * S),
+        Span(49 * S, 79 * S, cut=True),
+        Span(119 * S, 140 * S),
+        Span(149 * S, 160 * S),
     )
     assert inside(np.array([48, 49, 79, 80]) * S, found).tolist() == [False, True, True, False]
 
