@@ -11,8 +11,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from replay.evaluate.geometry import Floats
 from replay.time import to_datetime64
-from replay.view.frame import Floats
 from replay.view.labels import SIGMA, TIMES
 from replay.view.panels import Panel, Section
 from replay.view.scene import ELLIPSOID_SIGMAS, Scene

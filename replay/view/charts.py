@@ -18,9 +18,9 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from replay.evaluate.geometry import Floats
 from replay.evaluate.outages import Span
 from replay.time import seconds_between
-from replay.view.frame import Floats
 from replay.view.palette import OUTAGE, TRUTH
 from replay.view.panels import Curve, Panel, Shape
 from replay.view.sink import Times

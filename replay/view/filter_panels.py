@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.view.fields import doubles, integers
-from replay.view.frame import Floats
 from replay.view.gather import Run, RunData
 from replay.view.labels import (
     BODY_AXES,

@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from replay.evaluate.geometry import symmetric
+from replay.evaluate.geometry import Floats, symmetric
 from replay.log.columns import Columns
 from replay.view.fields import doubles, texts
-from replay.view.frame import Floats, geodetic
+from replay.view.frame import geodetic
 from replay.view.gather import RunData
 from replay.view.labels import SIGMA
 from replay.view.palette import TRUTH, Ink, receiver_ink, run_ink

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
+from replay.evaluate.geometry import Floats
 from replay.view.charts import Chart, draw
 from replay.view.filter_panels import innovation_groups
-from replay.view.frame import Floats
 from replay.view.gather import RunData
 from replay.view.labels import SIGMA
 from replay.view.palette import Ink, run_ink

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.time import NS_PER_S
 from replay.view.fields import doubles
-from replay.view.frame import Floats
 from replay.view.palette import AXES
 from replay.view.panels import Curve, Panel, Section, Shape
 from replay.view.sink import Times

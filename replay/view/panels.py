@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from replay.view.frame import Floats
+from replay.evaluate.geometry import Floats
 from replay.view.palette import Ink
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from replay.evaluate.geometry import Floats
 from replay.evaluate.outages import Span
 from replay.log.columns import Columns
 from replay.view.charts import Chart, draw
 from replay.view.fields import doubles
-from replay.view.frame import Floats, LocalFrame
+from replay.view.frame import LocalFrame
 from replay.view.gather import RunData
 from replay.view.outages import inside
 from replay.view.palette import OUTAGE, TRUTH, Ink, receiver_ink, run_ink

@@ -13,6 +13,7 @@ import numpy as np
 import rerun as rr
 
 from replay.errors import ReplayError
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.time import to_text
 from replay.view import labels
@@ -21,7 +22,6 @@ from replay.view.blueprint import Contents, make_blueprint
 from replay.view.events import events_of
 from replay.view.fields import doubles
 from replay.view.filter_panels import innovation_panels, sensor_panels
-from replay.view.frame import Floats
 from replay.view.gather import Batches, RunData, gather
 from replay.view.gnss_panels import gnss_panels
 from replay.view.navigation_panels import navigation_panels

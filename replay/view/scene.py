@@ -17,9 +17,10 @@ import numpy.typing as npt
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.view.fields import doubles
-from replay.view.frame import Floats, LocalFrame, geodetic
+from replay.view.frame import LocalFrame, geodetic
 from replay.view.gather import RunData
 from replay.view.outages import inside
 from replay.view.palette import OUTAGE, TRUTH, Ink, receiver_ink, run_ink

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from replay.view.frame import Floats
+from replay.evaluate.geometry import Floats
 
 Rows = npt.NDArray[np.int64]
 

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.view.fields import texts
-from replay.view.frame import Floats
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
