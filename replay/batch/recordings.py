@@ -168,7 +168,7 @@ def _outage(text: str) -> tuple[int, int]:
             raise ValueError
         begin_ns = round(float(start) * time.NS_PER_S)
         return begin_ns, begin_ns + round(float(duration) * time.NS_PER_S)
-    except ValueError:
+    except (ValueError, OverflowError):
         raise ConfigurationError(
             f"degrade: {text!r} is no outage", mend='write degrade = ["40,15"]: START,SECONDS'
         ) from None

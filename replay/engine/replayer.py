@@ -250,8 +250,8 @@ class Replayer:
         saved = resume.read(CHECKPOINT.topic)
         if len(saved) < len(self.nodes):
             raise UsageError("the earlier run ended before its first checkpoint")
-        times, counts = np.unique(saved.valid_time_ns, return_counts=True)
-        at_ns = int(times[counts == len(self.nodes)][-1])
+        times, stages = np.unique(saved.valid_time_ns, return_counts=True)
+        at_ns = int(times[stages == len(self.nodes)][-1])
         chosen = saved.take(saved.valid_time_ns == at_ns)
         by_stage = dict(
             zip(chosen.ragged("stage").texts(), chosen.ragged("state").blobs(), strict=True)

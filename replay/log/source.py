@@ -72,6 +72,19 @@ class Source:
             if self._map is not None:
                 self._map.close()
 
+    def forget(self, start: int, length: int) -> None:
+        """Let the system take back the memory of bytes that were read, not the bytes themselves.
+
+        Pages of a mapped file count as this process's until they are needed elsewhere, so
+        that a long log would look like a leak. A later look at them reads them again.
+        """
+        if self._map is None or not hasattr(mmap, "MADV_DONTNEED"):
+            return
+        first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
+        last = (start + length) // mmap.PAGESIZE * mmap.PAGESIZE
+        if last > first:
+            self._map.madvise(mmap.MADV_DONTNEED, first, last - first)
+
     def content(self, offset: int, length: int) -> memoryview:
         """Content of the record of `length` bytes at `offset`."""
         return self.view[offset + records.HEAD.size : offset + length]
@@ -160,6 +173,7 @@ def open_chunk(source: Source, offset: int, head: records.ChunkHead, *, check_cr
         raise DamageError(f"a chunk cannot be decompressed ({error})", offset) from error
     if check_crc and head.crc and zlib.crc32(plain) != head.crc:
         raise DamageError("the checksum of a chunk is wrong", offset)
+    source.forget(begin, head.compressed_bytes)
     data = np.frombuffer(plain, dtype=np.uint8)
     return walk(data, 0, len(data), offset)
 

@@ -202,6 +202,7 @@ def data_crc(source: Source, end: int) -> int:
     crc = 0
     for begin in range(0, end, _PIECE):
         crc = zlib.crc32(source.view[begin : min(begin + _PIECE, end)], crc)
+        source.forget(begin, _PIECE)
     return crc
 
 

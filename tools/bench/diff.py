@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from google.protobuf import descriptor_pool
+from google.protobuf.descriptor import FieldDescriptor
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from rich.console import Console
@@ -42,7 +43,7 @@ GROUPS = (
 
 
 def _columns(spec: ChannelSpec, times: np.ndarray, values: dict[str, Column]) -> Columns:
-    """Columns with noise in each vector that is not given."""
+    """Columns with noise in each vector and number that is not given."""
     rng = np.random.default_rng(len(times))
     filled = dict(values)
     for field in descriptor_pool.Default().FindMessageTypeByName(spec.message).fields:
@@ -50,6 +51,8 @@ def _columns(spec: ChannelSpec, times: np.ndarray, values: dict[str, Column]) ->
             continue
         if field.message_type is not None:
             filled[field.name] = rng.normal(size=(len(times), len(field.message_type.fields)))
+        elif field.type == FieldDescriptor.TYPE_DOUBLE and not field.is_repeated:
+            filled[field.name] = rng.normal(size=len(times))
     return Columns.build(times, filled)
 
 
