@@ -59,7 +59,10 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "Hz": {"Hz": 1.0, "kHz": 1e3},
 }
 
-_QUANTITY = re.compile(r"\s*(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>\S+)\s*")
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>\S+)\s*"
+)
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]")  # TOML 1.0 wants these escaped
 
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -240,7 +243,8 @@ def literal(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        escaped = _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", escaped)
         return f'"{escaped}"'
     if isinstance(value, list | tuple):
         return "[" + ", ".join(literal(item) for item in value) + "]"

@@ -71,15 +71,21 @@ def parse_calendar(text: str) -> int:
 
 def leap_seconds(gps_ns: int) -> int:
     """GPS minus UTC in seconds at a moment of GPS time (from erfa's table)."""
-    moment = GPS_EPOCH + datetime.timedelta(microseconds=gps_ns // 1000)
+    # The GPS calendar turns its days before UTC does: ask again with what comes out.
+    return _leap_seconds_of_utc(gps_ns - _leap_seconds_of_utc(gps_ns) * NS_PER_S)
+
+
+def _leap_seconds_of_utc(utc_ns: int) -> int:
+    """GPS minus UTC, given nanoseconds of UTC that are counted without leap seconds."""
+    moment = GPS_EPOCH + datetime.timedelta(microseconds=utc_ns // 1000)
     tai_minus_utc = erfa.dat(moment.year, moment.month, moment.day, 0.0)
     return int(tai_minus_utc) - TAI_MINUS_GPS_S
 
 
 def from_unix(unix_ns: int) -> int:
     """Nanoseconds of Unix time (UTC) to GPS nanoseconds."""
-    gps_ns = unix_ns - _UNIX_OF_GPS_EPOCH_NS
-    return gps_ns + leap_seconds(gps_ns) * NS_PER_S
+    utc_ns = unix_ns - _UNIX_OF_GPS_EPOCH_NS
+    return utc_ns + _leap_seconds_of_utc(utc_ns) * NS_PER_S
 
 
 def to_datetime64(gps_ns: npt.ArrayLike) -> npt.NDArray[np.datetime64]:

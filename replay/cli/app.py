@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 
 import typer
@@ -17,8 +18,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-out = Console()
-err = Console(stderr=True)
+
+
+class _Terminal(Console):
+    def on_broken_pipe(self) -> None:
+        """End well where the reader left early: `replay info LOG | head -1` is no failure."""
+        with contextlib.suppress(SystemExit):
+            super().on_broken_pipe()
+        sys.exit(int(ExitCode.OK))
+
+
+out = _Terminal()
+err = _Terminal(stderr=True)
 
 
 def say(text: str) -> None:
@@ -55,7 +66,8 @@ def main() -> None:
         app()
     except ReplayError as error:
         show_error(error)
-        sys.exit(int(error.exit_code))
+        missing = isinstance(error.__cause__, FileNotFoundError)
+        sys.exit(int(ExitCode.USAGE if missing else error.exit_code))
     except FileNotFoundError as error:
         show_error(ReplayError("no such file", where=str(error.filename)))
         sys.exit(int(ExitCode.USAGE))

@@ -26,7 +26,7 @@ def parse_time(text: str, start_ns: int) -> int:
         if float(text) < _LARGEST_RELATIVE_S:
             return start_ns + round(float(text) * time.NS_PER_S)
         return int(text)
-    except ValueError:
+    except (ValueError, OverflowError):
         pass
     try:
         return time.parse_calendar(text)
@@ -50,7 +50,7 @@ def parse_outage(text: str, start_ns: int) -> tuple[int, int]:
         if not comma:
             raise ValueError
         length_ns = round(float(duration) * time.NS_PER_S)
-    except ValueError:
+    except (ValueError, OverflowError):
         raise UsageError(
             f"{text!r} is no outage", mend="write --outage START,SECONDS, as in --outage 40,15"
         ) from None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.errors import ExitCode
@@ -80,18 +80,23 @@ def _show(case: CaseCheck) -> None:
     for note in case.notes:
         say(f"  {escape(note)}")
     if case.channels:
-        table = Table("channel that differs", "", "recorded", "found")
+        table = Table(_whole("channel that differs"), "", "recorded", "found")
         for channel in case.channels:
             sides = (_digest(channel.recorded), _digest(channel.found))
             table.add_row(channel.topic, channel.kind, *sides)
         out.print(table)
     if case.figures:
-        table = Table("figure that moved", "recorded", "found", "by")
+        table = Table(_whole("figure that moved"), "recorded", "found", "by")
         for figure in case.figures:
             old, new = figure.recorded, figure.found
             by = "" if old is None or new is None else f"{new - old:+.6g}"
             table.add_row(figure.name, _number(old), _number(new), by)
         out.print(table)
+
+
+def _whole(title: str) -> Column:
+    """A column whose names stay whole on a narrow terminal: the others give way."""
+    return Column(title, no_wrap=True)
 
 
 def _digest(digest: Digest | None) -> str:

@@ -62,7 +62,7 @@ def run(
     if config is not None:
         try:
             tables.append(tomllib.loads(config.read_text()))
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise UsageError(f"not TOML: {error}", where=str(config)) from error
     tables.append(parse_assignments(settings or []))
     with LogReader(log) as reader:

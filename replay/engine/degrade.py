@@ -16,7 +16,7 @@ import numpy as np
 
 from replay.channels import GNSS_FIX, GNSS_OBS
 from replay.engine.manifest import MANIFEST, make_manifest, manifest_metadata
-from replay.engine.sink import announce_as_recorded
+from replay.engine.sink import announce_as_recorded, require_another_file
 from replay.errors import UsageError
 from replay.log.reader import LogReader
 from replay.log.writer import LogWriter
@@ -61,8 +61,9 @@ def remove_fixes(source: Path, target: Path, outages: Sequence[Outage]) -> dict[
     Raises
     ------
     UsageError
-        Where an outage takes nothing away.
+        Where an outage takes nothing away, or both paths are the same.
     """
+    require_another_file(source, target)
     ordered = sorted(outages, key=lambda outage: outage.start_ns)
     removed: dict[str, int] = {}
     hits = np.zeros(len(ordered), dtype=np.int64)

@@ -69,6 +69,11 @@ def bind(
         }
         depth = 1 + max((depths[topic] for topic in inputs.values()), default=0)
         outputs = {spec.name: spec.at(run=run) for spec in stage.spec.outputs}
+        for spec in stage.spec.outputs:
+            if not spec.matches(outputs[spec.name]):
+                raise UsageError(
+                    f"a run cannot be named {run!r}", mend="--set name=NAME, without a slash"
+                )
         for topic in outputs.values():
             if topic in depths:
                 raise UsageError(

@@ -8,7 +8,7 @@ from pathlib import Path
 from replay.engine.job import Job
 from replay.engine.manifest import MANIFEST, make_manifest, manifest_metadata, read_manifest
 from replay.engine.replayer import Progress, Replayer, Result
-from replay.engine.sink import DigestSink
+from replay.engine.sink import DigestSink, require_another_file
 from replay.errors import ExitCode, IncomparableError, UsageError
 from replay.log.reader import LogReader
 from replay.log.writer import LogWriter
@@ -41,10 +41,11 @@ def replay_log(
     Raises
     ------
     UsageError
-        Where the earlier run was of another job.
+        Where the earlier run was of another job, or `target` is the input.
     LogError
         Where the input cannot be read.
     """
+    require_another_file(reader.path, target)
     replayer = Replayer(reader, job)
     text = job.text()
     with LogWriter(target) as writer:

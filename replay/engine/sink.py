@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Protocol
 
+from replay.errors import UsageError
 from replay.log.channel_info import ChannelInfo
 from replay.log.columns import Columns
 from replay.log.digest import ChannelDigest, Digester
@@ -85,3 +87,14 @@ def announce_as_recorded(sink: Sink, topic: str, info: ChannelInfo) -> None:
         depth=info.depth,
         metadata=info.metadata,
     )
+
+
+def require_another_file(source: Path, target: Path) -> None:
+    """Refuse to write a log onto the one that it is made from.
+
+    Raises
+    ------
+    UsageError
+    """
+    if Path(source).resolve() == Path(target).resolve():
+        raise UsageError("a log cannot be written onto its own input", where=str(target))

@@ -285,6 +285,11 @@ def _fix_records(fixes: Columns) -> Array:
     if moving.any():
         rows["v"] = fixes["velocity_ecef_m_s"]
         rows["V"] = fixes["velocity_covariance_enu_m2_s2"]
+    used = np.concatenate([rows["v"], rows["V"]], axis=1)[moving]
+    finite = np.isfinite(rows["lever"]).all(axis=1)
+    finite[moving] &= np.isfinite(used).all(axis=1)
+    # The compiled loop looks at the position alone before it leaves a fix out.
+    rows["r"][~finite] = np.nan
     return rows
 
 
