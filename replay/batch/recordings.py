@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from replay import time
 from replay.batch.baseline_file import NAME, Baseline, Case, load_baseline
-from replay.engine.degrade import Outage, remove_fixes
+from replay.engine.degrade import plan_outages, remove_fixes
 from replay.errors import ConfigurationError, UsageError
 from replay.importers import import_log, load_spec
-from replay.log.reader import LogReader
 from replay.simulate import simulate
 
 SCENARIO: Final = "scenario.toml"
@@ -145,30 +143,13 @@ def degrade_input(case: Case, source: Path, out: Path) -> Path:
     """
     if not case.degrade:
         return source
-    with LogReader(source) as reader:
-        first_ns, last_ns = reader.start_ns, reader.end_ns
-    period_ns = round(case.every * time.NS_PER_S)
-    latest_ns = last_ns - round(case.leave_last * time.NS_PER_S)
-    outages: list[Outage] = []
-    for text in case.degrade:
-        start_ns, end_ns = (first_ns + offset for offset in _outage(text))
-        outages.append(Outage(start_ns, end_ns))
-        while period_ns > 0 and end_ns + period_ns <= latest_ns:
-            start_ns, end_ns = start_ns + period_ns, end_ns + period_ns
-            outages.append(Outage(start_ns, end_ns))
+    try:
+        outages = plan_outages(
+            source, case.degrade, every_s=case.every, leave_last_s=case.leave_last
+        )
+    except UsageError as error:
+        raise ConfigurationError(
+            f"degrade: {error.what}", mend='write degrade = ["40,15"]: START,SECONDS'
+        ) from error
     remove_fixes(source, out, outages)
     return out
-
-
-def _outage(text: str) -> tuple[int, int]:
-    """Start and end since the first log time, ns."""
-    start, comma, duration = text.partition(",")
-    try:
-        if not comma:
-            raise ValueError
-        begin_ns = round(float(start) * time.NS_PER_S)
-        return begin_ns, begin_ns + round(float(duration) * time.NS_PER_S)
-    except (ValueError, OverflowError):
-        raise ConfigurationError(
-            f"degrade: {text!r} is no outage", mend='write degrade = ["40,15"]: START,SECONDS'
-        ) from None

@@ -1,5 +1,5 @@
 """The command `replay`: words in, library calls, text and exit codes out."""
 
-from replay.cli.app import main
+from replay.cli.main import main
 
 __all__ = ["main"]

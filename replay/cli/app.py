@@ -1,4 +1,4 @@
-"""The application: its commands, and what becomes of errors."""
+"""The application that commands register with, and how it speaks."""
 
 from __future__ import annotations
 
@@ -32,14 +32,24 @@ out = _Terminal()
 err = _Terminal(stderr=True)
 
 
-def say(text: str) -> None:
-    """Print a line that the terminal wraps, not this program: paths stay whole."""
-    out.print(text, soft_wrap=True)
+def say(text: str, *, lead: str = "", style: str = "") -> None:
+    """Print a line that the terminal wraps, not this program: paths stay whole.
+
+    Parameters
+    ----------
+    text : str
+        Printed as it stands, brackets and all.
+    lead : str
+        Printed before it, in `style`.
+    style : str
+        A style of rich, such as "bold red".
+    """
+    out.print(Text.assemble((lead, style), text), soft_wrap=True)
 
 
-def warn(text: str) -> None:
+def warn(text: str, *, lead: str = "", style: str = "") -> None:
     """Print such a line on the error stream."""
-    err.print(text, soft_wrap=True)
+    err.print(Text.assemble((lead, style), text), soft_wrap=True)
 
 
 def leave(code: ExitCode) -> None:
@@ -55,21 +65,3 @@ def show_error(error: ReplayError) -> None:
         err.print(Text.assemble(("where: ", "bold"), error.where))
     if error.mend:
         err.print(Text.assemble(("mend:  ", "bold"), error.mend))
-
-
-def main() -> None:
-    """Entry point of the console command."""
-    # Commands register themselves on import; libraries are imported when a command runs.
-    from replay.cli import baselines, logs, looks, runs  # noqa: F401
-
-    try:
-        app()
-    except ReplayError as error:
-        show_error(error)
-        missing = isinstance(error.__cause__, FileNotFoundError)
-        sys.exit(int(ExitCode.USAGE if missing else error.exit_code))
-    except FileNotFoundError as error:
-        show_error(ReplayError("no such file", where=str(error.filename)))
-        sys.exit(int(ExitCode.USAGE))
-    except BrokenPipeError:
-        sys.exit(int(ExitCode.OK))

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 from rich.table import Column, Table
+from rich.text import Text
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.errors import ExitCode
@@ -71,14 +71,15 @@ def update_(
     from replay.batch.recordings import find_recordings
 
     for line in update(find_recordings(recordings, only or ()), reason, data):
-        say(escape(line))
+        say(line)
 
 
 def _show(case: CaseCheck) -> None:
     color = "green" if case.exit_code is ExitCode.OK else "bold red"
-    say(f"{case.recording}/{case.case}: [{color}]{case.verdict.value}[/]")
+    name = f"{case.recording}/{case.case}: "
+    out.print(Text.assemble(name, (case.verdict.value, color)), soft_wrap=True)
     for note in case.notes:
-        say(f"  {escape(note)}")
+        say(f"  {note}")
     if case.channels:
         table = Table(_whole("channel that differs"), "", "recorded", "found")
         for channel in case.channels:

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from replay.cli.app import app, leave, out, say, warn
-from replay.cli.runs import Output
+from replay.cli.arguments import Output
 
 _SHOWN_GAPS = 3
 
@@ -40,7 +40,7 @@ def import_(
     for loss in result.losses.losses:
         warn(f"skipped: {loss}")
     for mismatch in result.mismatches:
-        warn(f"[bold red]not as expected[/]: {mismatch}")
+        warn(mismatch, lead="not as expected: ", style="bold red")
     if update_expected and result.mismatches:
         save(spec, result)
         warn(f"{spec}: expected digests updated")
@@ -110,13 +110,13 @@ def doctor(log: Annotated[Path, typer.Argument(help="Log to look at.")]) -> None
     )
     say(f"{found.path}: {found.file_bytes:,} bytes, {count:,} readable messages{span}")
     for loss in found.report.losses:
-        say(f"[red]damaged[/]: {loss}")
+        say(str(loss), lead="damaged: ", style="red")
     for note in found.notes:
         say(f"note: {note}")
     if found.report:
         say(f"mend: replay recover {log} -o RECOVERED.mcap")
     else:
-        say("[green]whole[/]")
+        say("", lead="whole", style="green")
     leave(found.exit_code)
 
 

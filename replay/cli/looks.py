@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from replay.cli.app import app, leave, out, say, warn
-from replay.cli.runs import Output
+from replay.cli.arguments import Output
 from replay.errors import ExitCode, MissingChannelError, UsageError
 
 

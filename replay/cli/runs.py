@@ -13,10 +13,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from replay.cli.app import app, err, leave, out, say, warn
-from replay.cli.arguments import parse_outage, parse_time
+from replay.cli.arguments import Output
 from replay.errors import ExitCode, UsageError
 
-Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 ShowProgress = Annotated[
     bool | None, typer.Option("--progress/--no-progress", help="Default: on a terminal only.")
 ]
@@ -53,6 +52,7 @@ def run(
     """Run a pipeline over a log and write everything it says to a new log."""
     from replay.configuration import parse_assignments
     from replay.engine.job import make_job
+    from replay.engine.moments import parse_time
     from replay.engine.run import replay_log
     from replay.log.reader import LogReader
 
@@ -149,21 +149,9 @@ def degrade(
     ] = 30.0,
 ) -> None:
     """Write a log without GNSS for some stretches of time."""
-    from replay.engine.degrade import Outage, remove_fixes
-    from replay.log.reader import LogReader
+    from replay.engine.degrade import plan_outages, remove_fixes
 
-    with LogReader(log) as reader:
-        first_ns, last_ns = reader.start_ns, reader.end_ns
-    outages: list[Outage] = []
-    for text in outage:
-        start_ns, end_ns = parse_outage(text, first_ns)
-        outages.append(Outage(start_ns, end_ns))
-        period_ns = round(every * 1e9)
-        while period_ns > 0:
-            start_ns, end_ns = start_ns + period_ns, end_ns + period_ns
-            if end_ns > last_ns - round(leave_last * 1e9):
-                break
-            outages.append(Outage(start_ns, end_ns))
+    outages = plan_outages(log, outage, every_s=every, leave_last_s=leave_last)
     removed = remove_fixes(log, output, outages)
     for topic, count in removed.items():
         say(f"{topic}: {count:,} rows left out in {len(outages)} outages")

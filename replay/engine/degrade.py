@@ -14,8 +14,10 @@ from typing import Final
 
 import numpy as np
 
+from replay import time
 from replay.channels import GNSS_FIX, GNSS_OBS
 from replay.engine.manifest import MANIFEST, make_manifest, manifest_metadata
+from replay.engine.moments import parse_outage
 from replay.engine.sink import announce_as_recorded, require_another_file
 from replay.errors import UsageError
 from replay.log.reader import LogReader
@@ -42,6 +44,41 @@ class Outage:
             raise UsageError(
                 "an outage ends after it begins", mend="write --outage START,SECONDS, SECONDS > 0"
             )
+
+
+def plan_outages(
+    source: Path, texts: Sequence[str], *, every_s: float = 0.0, leave_last_s: float = 0.0
+) -> list[Outage]:
+    """Outages as a person writes them, each maybe repeated to near the end of a log.
+
+    Parameters
+    ----------
+    source : Path
+        The log that they are meant for.
+    texts : sequence of str
+        `START,SECONDS` each; a number as START counts from the log's first row.
+    every_s : float, s
+        Between repetitions; 0 for none.
+    leave_last_s : float, s
+        At the end of the log, where no repetition may reach.
+
+    Raises
+    ------
+    UsageError
+        Where a text is no outage.
+    """
+    with LogReader(source) as reader:
+        first_ns, last_ns = reader.start_ns, reader.end_ns
+    period_ns = round(every_s * time.NS_PER_S)
+    latest_ns = last_ns - round(leave_last_s * time.NS_PER_S)
+    outages: list[Outage] = []
+    for text in texts:
+        start_ns, end_ns = parse_outage(text, first_ns)
+        outages.append(Outage(start_ns, end_ns))
+        while period_ns > 0 and end_ns + period_ns <= latest_ns:
+            start_ns, end_ns = start_ns + period_ns, end_ns + period_ns
+            outages.append(Outage(start_ns, end_ns))
+    return outages
 
 
 def remove_fixes(source: Path, target: Path, outages: Sequence[Outage]) -> dict[str, int]:

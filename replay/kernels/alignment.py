@@ -49,6 +49,8 @@ from replay.kernels.update import diagonal, fill_covariance, record_event, state
 _GRAVITY_M_S2 = 9.80665
 _HALF_TURN_RAD = 3.141592653589793
 _GUARD_BLOCKS = 2
+_LARGEST_BIAS_RAD_S = 0.05  # 3 deg/s: what a gyro at rest may show
+_RECENT_FIX_S = 2.0
 _TURN_WINDOW_S = 0.2  # long enough to average an engine's shaking
 _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
@@ -77,6 +79,17 @@ def _level(s: Record, work: Record) -> None:
 
 
 @njit(cache=True)
+def _is_driven(s: Record, cfg: Record, work: Record, t: int) -> bool:
+    """Whether what looks like rest is smooth motion: GNSS says so, or no bias is that large."""
+    mean = work["mean"]
+    rate = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]
+    if rate > _LARGEST_BIAS_RAD_S * _LARGEST_BIAS_RAD_S:
+        return True
+    recent = s["align_fix_t"] >= 0 and (t - s["align_fix_t"]) * 1e-9 < _RECENT_FIX_S
+    return recent and s["align_speed"] >= cfg["course_speed"]
+
+
+@njit(cache=True)
 def align_sample(
     s: Record,
     cfg: Record,
@@ -90,7 +103,7 @@ def align_sample(
     """Take one inertial sample (in `s["w_raw"]`, `s["f_raw"]`) while the attitude is unknown."""
     w, f = s["w_raw"], s["f_raw"]
     push_sample(s, w, f)
-    still = is_still(s, cfg, work, False)
+    still = is_still(s, cfg, work, False) and not _is_driven(s, cfg, work, t)
     if still:
         # A sample of a little earlier: the first ones of a start pass for rest.
         total = s["rest_sum"]

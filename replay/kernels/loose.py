@@ -15,6 +15,7 @@ from replay.kernels.constraints import (
     zero_rate_update,
     zero_velocity_update,
 )
+from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
 from replay.kernels.output_rows import emit_epoch, emit_solution
@@ -39,6 +40,29 @@ from replay.kernels.update import record_event
 
 NOTE_IMU = 0
 NOTE_FIX = 1
+NOTE_EARLY = 2
+
+
+@njit(cache=True)
+def _doubt(s: Record, cfg: Record, fix: Record) -> None:
+    """Widen the covariance by what a fix that was refused again and again says.
+
+    Without that the gain would be as small as the covariance that led to the refusals.
+    """
+    nav, P = s["nav"], s["P"]
+    position = velocity = 0.0
+    for i in range(3):
+        d = fix["r"][i] - nav["r"][i]
+        position += d * d
+        if fix["has_v"] == 1:
+            d = fix["v"][i] - nav["v"][i]
+            velocity += d * d
+    velocity += cfg["velocity_initial"] * cfg["velocity_initial"]
+    attitude = cfg["heading_initial"] * cfg["heading_initial"]
+    for i in range(3):
+        P[POSITION + i, POSITION + i] += position
+        P[VELOCITY + i, VELOCITY + i] += velocity
+        P[ATTITUDE + i, ATTITUDE + i] += attitude
 
 
 @njit(cache=True)
@@ -50,6 +74,8 @@ def _use_fix(
     t = fix["t"]
     remove_sensor_errors(s, work)
     force = cfg["rejections"] > 0 and s["rejected"] >= cfg["rejections"]
+    if force:
+        _doubt(s, cfg, fix)
     used = position_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     if used:
         if force:
@@ -123,6 +149,7 @@ def _take_fixes(
     """Use every fix that is known by now and valid up to `t`; the number of the next one."""
     solutions, _, _, _, events, counts = out
     k = first
+    early = 0
     while k < fixes.shape[0] and fixes[k]["t"] <= t and fixes[k]["log_t"] <= log_t:
         fix = fixes[k]
         k += 1
@@ -131,10 +158,7 @@ def _take_fixes(
             continue
         if s["mode"] != RUNNING:
             if fix["t"] < s["imu_t"]:
-                record_event(
-                    events, counts, fix["t"], log_t, EVENT_TIME_BACKWARD,
-                    (s["imu_t"] - fix["t"]) * 1e-9, NOTE_FIX,
-                )  # fmt: skip
+                early += 1
             elif align_fix(s, cfg, work, fix, log_t, events, counts):
                 s["fix_t"] = fix["t"]
                 mark_epoch(s, fix)
@@ -143,7 +167,7 @@ def _take_fixes(
                 emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
                 emit_epoch(s, cfg, log_t, out[1], out[2], counts)
             continue
-        if fix["t"] < s["t"]:
+        if fix["t"] < s["t"] or fix["t"] == s["moved_t"]:
             late = (s["t"] - fix["t"]) * 1e-9
             record_event(events, counts, fix["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
             continue
@@ -152,6 +176,8 @@ def _take_fixes(
             emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
         advance(s, cfg, work, fix["t"])
         _use_fix(s, cfg, work, fix, log_t, out)
+    if early > 0:
+        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, float(early), NOTE_EARLY)
     return k
 
 

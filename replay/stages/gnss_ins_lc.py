@@ -26,6 +26,7 @@ Array = np.ndarray[Any, Any]
 _NS: Final = 1_000_000_000
 _GAP_INTERVALS: Final = 5.0
 _NOTES: Final = ("inertial sample", "GNSS fix")
+_EARLY_TEXT: Final = "{value:.0f} GNSS fixes skipped: older than the inertial samples at hand"
 _EVENT_TEXT: Final = {
     records.EVENT_LEVELLED: "levelled after {value:.1f} s at rest",
     records.EVENT_ALIGNED: "heading from course: {value:.4f} rad",
@@ -350,7 +351,9 @@ def _covariance_columns(rows: Array, triangles: Array, names: tuple[str, ...]) -
 
 def _event_columns(rows: Array) -> Columns:
     details = [
-        _EVENT_TEXT[int(row["kind"])].format(
+        _EARLY_TEXT.format(value=float(row["value"]))
+        if row["note"] == loose.NOTE_EARLY
+        else _EVENT_TEXT[int(row["kind"])].format(
             value=float(row["value"]), note=_NOTES[int(row["note"])]
         )
         for row in rows

@@ -19,8 +19,8 @@ import pytest
 from replay import time
 from replay.cli import main
 from replay.cli.app import err, out
-from replay.cli.arguments import parse_outage, parse_time
 from replay.configuration import describe
+from replay.engine.moments import parse_outage, parse_time
 from replay.errors import UsageError
 from replay.log.reader import LogReader
 from replay.stages.loose_config import LooseConfig
