@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
+from typing import Final, TextIO
 
 import typer
 from rich.console import Console
 from rich.text import Text
 
 from replay.errors import ExitCode, ReplayError
+
+_WIDTH_OF_A_FILE: Final = 160
 
 app = typer.Typer(
     name="replay",
@@ -28,8 +32,14 @@ class _Terminal(Console):
         sys.exit(int(ExitCode.OK))
 
 
-out = _Terminal()
-err = _Terminal(stderr=True)
+def _width(stream: TextIO) -> int | None:
+    """Width of a stream: a terminal's own, or room for every table where there is none."""
+    known = stream.isatty() or "COLUMNS" in os.environ
+    return None if known else _WIDTH_OF_A_FILE
+
+
+out = _Terminal(width=_width(sys.stdout))
+err = _Terminal(stderr=True, width=_width(sys.stderr))
 
 
 def say(text: str, *, lead: str = "", style: str = "") -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.cli.arguments import Output
@@ -59,7 +59,10 @@ def info(log: Annotated[Path, typer.Argument(help="Log to describe.")]) -> None:
         for name, s in found.compression.items()
     )
     say(f"{found.path}: {found.file_bytes / 1e6:,.1f} MB, {packed}, by {found.library}")
-    table = Table("channel", "message", "rows", "rate", "from (GPS time)", "span", "gaps", "sha256")
+    table = Table(
+        Column("channel", no_wrap=True),
+        *("message", "rows", "rate", "from (GPS time)", "span", "gaps", "sha256"),
+    )
     for channel in found.channels:
         start, end = channel.valid_span_ns
         rows = channel.digest.message_count
