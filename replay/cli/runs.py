@@ -14,6 +14,7 @@ from rich.table import Table
 
 from replay.cli.app import app, err, leave, out, say, warn
 from replay.cli.arguments import Output
+from replay.cli.events import event_summary
 from replay.errors import ExitCode, UsageError
 
 ShowProgress = Annotated[
@@ -82,6 +83,8 @@ def run(
     out.print(table)
     if result.first_ns >= 0:
         say(f"{(result.last_ns - result.first_ns) / 1e9:,.1f} s of log")
+    for line in event_summary(output):
+        say(line)
     for note in result.notes:
         warn(f"note: {note}")
     if rrd is not None:
