@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import decimal
+from typing import Final
+
 from replay import time
 from replay.errors import UsageError
 
-_LARGEST_RELATIVE_S = 1e8  # three years; larger numbers are GPS nanoseconds
+_LARGEST_RELATIVE_S: Final = 100_000_000  # three years of log
+_LARGEST_SECONDS: Final = 100_000_000_000  # larger numbers are nanoseconds
 
 
 def parse_time(text: str, start_ns: int) -> int:
-    """A moment: seconds from the log's start, GPS nanoseconds, or a date of GPS time.
+    """A moment as a number or as a date of GPS time.
 
     Parameters
     ----------
     text : str
-        `40`, `1436038461499000000` or `2025-07-08T19:35:00`.
+        Seconds from the log's start (`40`), seconds (`1436038498.5`) or nanoseconds
+        (`1436038498500000000`) of GPS time since 1980, told apart by their size, or a
+        date (`2025-07-08T19:35:00`). Exact to the nanosecond.
     start_ns : int
         First log time of the log, GPS nanoseconds.
 
@@ -23,10 +29,13 @@ def parse_time(text: str, start_ns: int) -> int:
     UsageError
     """
     try:
-        if float(text) < _LARGEST_RELATIVE_S:
-            return start_ns + round(float(text) * time.NS_PER_S)
+        number = decimal.Decimal(text)
+        if abs(number) < _LARGEST_RELATIVE_S:
+            return start_ns + round(number * time.NS_PER_S)
+        if abs(number) < _LARGEST_SECONDS:
+            return round(number * time.NS_PER_S)
         return int(text)
-    except (ValueError, OverflowError):
+    except (decimal.InvalidOperation, ValueError, OverflowError):
         pass
     try:
         return time.parse_calendar(text)
@@ -34,7 +43,7 @@ def parse_time(text: str, start_ns: int) -> int:
         raise UsageError(
             f"{text!r} is no time",
             mend="write seconds from the log's start (40), a date of GPS time "
-            "(2025-07-08T19:35:00) or GPS nanoseconds",
+            "(2025-07-08T19:35:00), or seconds or nanoseconds of GPS time since 1980",
         ) from None
 
 
