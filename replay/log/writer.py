@@ -51,7 +51,8 @@ class LogWriter:
     compression : "lz4", "zstd" or "none"
         Of the chunks.
     chunk_bytes : int
-        Size that chunks are filled up to, before compression.
+        Size that chunks are filled up to, before compression. A log that is cut off
+        loses its last chunk, so larger ones are faster and lose more.
 
     Raises
     ------
@@ -64,7 +65,7 @@ class LogWriter:
         path: str | os.PathLike[str],
         *,
         compression: Compression = "zstd",
-        chunk_bytes: int = 1 << 20,
+        chunk_bytes: int = 1 << 18,
     ) -> None:
         self.path = Path(path)
         self._part = self.path.with_name(self.path.name + ".part")
