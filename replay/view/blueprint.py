@@ -32,6 +32,7 @@ _SENSOR_SECTIONS: Final = (
     Section.GYRO_BIAS, Section.ACCEL_BIAS, Section.GYRO_SCALE, Section.ACCEL_SCALE,
     Section.MOUNTING,
     Section.NON_SLIP,
+    Section.SQUAT,
 )  # fmt: skip
 Part = rrb.Container | rrb.View
 _MAX_CURVES_IN_LEGEND: Final = 12

@@ -69,6 +69,10 @@ _SENSOR_STATES: Final = (
         Section.NON_SLIP, "non_slip_point", "non_slip_point_body_m", "non_slip_point", "m", 1.0,
         suffixes=(("_forward", "_x"), ("_right", "_y"), ("_down", "_z")),
     ),
+    _SensorState(
+        Section.SQUAT, "squat", "squat_rad_s2_m", "squat", "mrad/(m/s^2)", 1e3,
+        axes=("pitch",), suffixes=(("",),),
+    ),
 )  # fmt: skip
 
 
@@ -91,7 +95,7 @@ def _sensor_curves(item: _SensorState, run: Run, index: int, axis: int) -> list[
     if run.state is None or item.field not in run.state.values:
         return []
     times = run.state.valid_time_ns
-    values = doubles(run.state, item.field)[:, axis] * item.factor
+    values = doubles(run.state, item.field).reshape(len(times), -1)[:, axis] * item.factor
     sigma = np.full(len(times), np.nan)
     if run.sigmas is not None:
         sigma = run.sigmas.at(times, item.sigma_prefix, item.suffixes[axis]) * item.factor

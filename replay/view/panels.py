@@ -40,6 +40,7 @@ class Section(enum.Enum):
     ACCEL_SCALE = "Accel. scale factor"
     MOUNTING = "Mounting angle"
     NON_SLIP = "Non-slip point"
+    SQUAT = "Squat"
     INNOVATIONS = "Innovations"
     NIS = "Normalised innovation squared"
     GNSS = "GNSS"

@@ -52,6 +52,7 @@ _GROUPS: Final = (
             Section.ACCEL_SCALE,
             Section.MOUNTING,
             Section.NON_SLIP,
+            Section.SQUAT,
         ),
         f"Estimates with {BOUNDS} of the filter, in body axes.",
     ),

@@ -37,7 +37,7 @@ class Sigmas:
         prefix : str
             Beginning of the state's name, "gyro_bias".
         suffixes : iterable of str
-            Its ends, the first that is found counts: "_x", "_roll".
+            Its ends, the first that is found counts: "_x", "_roll", or "" for the whole name.
 
         Returns
         -------
@@ -48,7 +48,7 @@ class Sigmas:
             name
             for end in suffixes
             for name in self.values
-            if name.startswith(prefix + "_") and name.endswith(end)
+            if name == prefix + end or (end and name.startswith(prefix) and name.endswith(end))
         ]
         if not found or len(self.times_ns) == 0:
             return np.full(len(times_ns), np.nan)
