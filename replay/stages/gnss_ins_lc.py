@@ -14,7 +14,7 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.errors import ConfigurationError
+from replay.errors import ConfigurationError, DataError
 from replay.ins.states import state_names
 from replay.kernels import loose, records
 from replay.log.columns import Columns, Ragged
@@ -158,6 +158,12 @@ class GnssInsLoose:
             events,
             counts,
         )
+        if counts[4]:
+            raise DataError(
+                f"{counts[4]} events of one block found no room",
+                where=self.spec.name,
+                mend="report this with the log: what happened would not be told",
+            )
         state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
         state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
         state.pending = state.pending[taken:]

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from replay.configuration import STANDARD_GRAVITY_M_S2
 from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
 from replay.view.fields import doubles, integers
@@ -25,7 +26,6 @@ from replay.view.labels import (
 from replay.view.palette import BOUND, REJECTED, TRUTH, run_ink
 from replay.view.panels import Curve, Panel, Section, Shape, finite_curve, panel, sigma_band
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665  # CGPM 1901
 _DEG_H: Final = np.degrees(1.0) * 3600.0
 _MG: Final = 1e3 / STANDARD_GRAVITY_M_S2
 _XYZ: Final = (("_x",), ("_y",), ("_z",))

@@ -11,7 +11,7 @@ import dataclasses
 import numpy as np
 import pymap3d
 
-from replay.evaluate.geometry import Floats, body_to_enu, enu_axes, symmetric, turn, turn_back
+from replay.evaluate.geometry import Floats, body_to_enu, enu_axes, symmetric
 
 
 def geodetic(ecef_m: Floats) -> Floats:
@@ -74,26 +74,3 @@ class LocalFrame:
         between = np.einsum("ij,nkj->nik", origin, local)
         turned: Floats = np.einsum("nij,njk,nlk->nil", between, symmetric(packed_enu), between)
         return turned
-
-
-def shifted_ecef(
-    position_ecef_m: Floats, attitude_rad: Floats, lever_arm_body_m: Floats
-) -> tuple[Floats, Floats]:
-    """Points at a lever arm from the IMU.
-
-    Parameters
-    ----------
-    position_ecef_m : array (n, 3), m
-        IMU origin.
-    attitude_rad : array (n, 3), rad
-        Roll, pitch, heading there.
-    lever_arm_body_m : array (n, 3), m
-
-    Returns
-    -------
-    point_ecef_m : array (n, 3), m
-    body_to_enu : array (n, 3, 3)
-    """
-    to_enu = body_to_enu(attitude_rad)
-    offset_enu = turn(to_enu, lever_arm_body_m)
-    return position_ecef_m + turn_back(enu_axes(position_ecef_m), offset_enu), to_enu
