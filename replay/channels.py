@@ -134,6 +134,113 @@ GNSS_OBS: Final = ChannelSpec(
         "cn0_dbhz": Tolerance(1e-3, "dB-Hz"),
     },
 )
+RECEIVER: Final = ChannelSpec(
+    "RECEIVER",
+    "/gnss/{receiver}/receiver",
+    "replay.ReceiverInfo",
+    "receiver, antenna and stated position",
+    tolerances={
+        "approximate_position_ecef_m": _M,
+        "antenna_offset_enu_m": _M,
+        "interval_s": Tolerance(1e-9, "s"),
+    },
+)
+RECEIVER_EPOCH: Final = ChannelSpec(
+    "RECEIVER_EPOCH",
+    "/gnss/{receiver}/epochs",
+    "replay.ReceiverEpoch",
+    "what a receiver said of each epoch",
+    tolerances={"clock_offset_s": Tolerance(1e-12, "s")},
+)
+NAV: Final = ChannelSpec(
+    "NAV",
+    "/gnss/nav",
+    "replay.BroadcastEphemeris",
+    "broadcast orbits and clocks",
+    key=("satellite", "source", "toe_ns"),
+)
+NAV_IONOSPHERE: Final = ChannelSpec(
+    "NAV_IONOSPHERE",
+    "/gnss/nav/ionosphere",
+    "replay.BroadcastIonosphere",
+    "broadcast ionosphere",
+    key=("system", "model"),
+)
+NAV_TIME: Final = ChannelSpec(
+    "NAV_TIME",
+    "/gnss/nav/time",
+    "replay.TimeCorrection",
+    "broadcast differences of time scales",
+    key=("scales",),
+)
+SATELLITES: Final = ChannelSpec(
+    "SATELLITES",
+    "/gnss/{receiver}/satellites",
+    "replay.SatelliteSight",
+    "orbit, clock, elevation and azimuth per satellite",
+    key=("satellite",),
+    tolerances={
+        "position_ecef_m": _M,
+        "velocity_ecef_m_s": _M_S,
+        "clock_s": Tolerance(1e-12, "s"),
+        "clock_drift_s_s": Tolerance(1e-15, "s/s"),
+        "elevation_rad": _RAD,
+        "azimuth_rad": _RAD,
+        "range_std_m": _M,
+        "ephemeris_age_s": Tolerance(1e-6, "s"),
+    },
+)
+CORRECTIONS: Final = ChannelSpec(
+    "CORRECTIONS",
+    "/gnss/{receiver}/corrections",
+    "replay.SignalCorrections",
+    "every term between range and pseudorange, per satellite and signal",
+    key=("satellite", "signal"),
+    tolerances={
+        "distance_m": _M,
+        "sagnac_m": _M,
+        "satellite_clock_m": _M,
+        "relativity_m": _M,
+        "group_delay_m": _M,
+        "ionosphere_m": _M,
+        "hydrostatic_m": _M,
+        "wet_m": _M,
+        "hydrostatic_mapping": Tolerance(1e-6, "1"),
+        "wet_mapping": Tolerance(1e-6, "1"),
+        "shapiro_m": _M,
+    },
+)
+GNSS_EVENTS: Final = ChannelSpec(
+    "GNSS_EVENTS",
+    "/gnss/{receiver}/events",
+    "replay.FilterEvent",
+    "what was wrong with a receiver's data",
+    key=("kind", "detail"),
+    tolerances={"value": Tolerance(1e-6, "1")},
+)
+SLIPS: Final = ChannelSpec(
+    "SLIPS",
+    "/gnss/{receiver}/slips",
+    "replay.CycleSlip",
+    "breaks of carrier phases",
+    key=("satellite", "signal", "detector"),
+    tolerances={
+        "statistic": Tolerance(1e-6, "cycle"),
+        "threshold": Tolerance(1e-6, "cycle"),
+        "size_cycles": Tolerance(1e-6, "cycle"),
+    },
+)
+DISPLACEMENT: Final = ChannelSpec(
+    "DISPLACEMENT",
+    "/gnss/{receiver}/displacement",
+    "replay.Displacement",
+    "position change from carrier phases",
+    tolerances={
+        "displacement_ecef_m": _M,
+        "covariance_enu_m2": _M2,
+        "unit_weight_std": Tolerance(1e-6, "1"),
+    },
+)
 TRUTH: Final = ChannelSpec(
     "TRUTH",
     "/truth",
@@ -191,6 +298,62 @@ FILTER_EVENTS: Final = ChannelSpec(
     key=("kind",),
     tolerances={"value": Tolerance(1e-6, "1")},
 )
+FILTER_CLOCKS: Final = ChannelSpec(
+    "FILTER_CLOCKS",
+    "/filter/{run}/clocks",
+    "replay.ReceiverClock",
+    "receiver clock against each system",
+    key=("system",),
+    tolerances={
+        "offset_m": _M,
+        "offset_std_m": _M,
+        "drift_m_s": _M_S,
+        "drift_std_m_s": _M_S,
+    },
+)
+FILTER_GEOMETRY: Final = ChannelSpec(
+    "FILTER_GEOMETRY",
+    "/filter/{run}/geometry",
+    "replay.GnssGeometry",
+    "satellites used and dilution of precision",
+    tolerances={
+        name: Tolerance(1e-6, "1")
+        for name in (
+            "gdop",
+            "pdop",
+            "hdop",
+            "vdop",
+            "gps_pdop",
+            "glonass_pdop",
+            "galileo_pdop",
+            "beidou_pdop",
+        )
+    },
+)
+FILTER_AMBIGUITIES: Final = ChannelSpec(
+    "FILTER_AMBIGUITIES",
+    "/filter/{run}/ambiguities",
+    "replay.DoubleDifferenceAmbiguity",
+    "double-difference ambiguities, real and integer",
+    key=("satellite", "signal"),
+    tolerances={
+        "float_cycles": Tolerance(1e-4, "cycle"),
+        "float_std_cycles": Tolerance(1e-4, "cycle"),
+        "integer_cycles": Tolerance(1e-9, "cycle"),
+    },
+)
+FILTER_RESOLUTION: Final = ChannelSpec(
+    "FILTER_RESOLUTION",
+    "/filter/{run}/resolution",
+    "replay.AmbiguityResolution",
+    "tests of the integers of each epoch",
+    tolerances={
+        "ratio": Tolerance(1e-4, "1"),
+        "w_ratio": Tolerance(1e-4, "1"),
+        "threshold": Tolerance(1e-6, "1"),
+        "success_rate": Tolerance(1e-6, "1"),
+    },
+)
 SOLUTION: Final = ChannelSpec(
     "SOLUTION",
     "/solution/{run}",
@@ -220,10 +383,24 @@ CHECKPOINT: Final = ChannelSpec(
 # The order is the rank that breaks ties between rows of one time and one depth.
 CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     IMU,
+    RECEIVER,
+    NAV,
+    NAV_IONOSPHERE,
+    NAV_TIME,
+    RECEIVER_EPOCH,
     GNSS_OBS,
     GNSS_FIX,
     TRUTH,
+    SATELLITES,
+    CORRECTIONS,
+    GNSS_EVENTS,
+    SLIPS,
+    DISPLACEMENT,
     FILTER_INNOVATIONS,
+    FILTER_CLOCKS,
+    FILTER_GEOMETRY,
+    FILTER_AMBIGUITIES,
+    FILTER_RESOLUTION,
     FILTER_STATE,
     FILTER_COVARIANCE,
     FILTER_EVENTS,

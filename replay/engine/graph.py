@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
-from replay.channels import ChannelSpec
 from replay.errors import MissingChannelError, UsageError
-from replay.stages.base import Stage
+from replay.stages.base import Port, Stage
 
-_RECEIVER = "receiver"
+_USUAL: Final = {"receiver": "rover", "base": "base"}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -20,7 +19,8 @@ class Node:
     Attributes
     ----------
     stage : Stage
-    inputs, outputs : mapping of ChannelSpec.name to topic
+    inputs, outputs : mapping of Port.name to topic
+        Optional inputs that the log lacks are not in it.
     depth : int
         1 for a stage that reads what was recorded, one more than the deepest
         stage that it reads from.
@@ -38,9 +38,16 @@ class Node:
 
 
 def bind(
-    stages: Sequence[Stage[Any]], recorded: Mapping[str, int], *, run: str, receiver: str = ""
+    stages: Sequence[Stage[Any]],
+    recorded: Mapping[str, int],
+    *,
+    run: str,
+    receivers: Mapping[str, str] | None = None,
 ) -> tuple[Node, ...]:
     """Give each stage its topics.
+
+    The last stage writes the run that was asked for; one before it writes a run of
+    its own name, and is left out where the log has what later stages need of it.
 
     Parameters
     ----------
@@ -49,9 +56,10 @@ def bind(
     recorded : mapping of topic to depth
         What the log has.
     run : str
-        Name that fills `{run}` in the topics of outputs.
-    receiver : str
-        Which receiver to use where the log has several; empty takes the only one.
+        Name that fills `{run}` in the topics of the last stage's outputs.
+    receivers : mapping of role to str, optional
+        Which receiver plays which role. Where it is empty the only one that the log
+        has is taken, leaving aside the one that plays another role or is called so.
 
     Raises
     ------
@@ -62,15 +70,30 @@ def bind(
     """
     depths = dict(recorded)
     nodes: list[Node] = []
-    for stage in stages:
-        inputs = {
-            spec.name: _find(spec, stage.spec.name, list(depths), receiver)
-            for spec in stage.spec.inputs
-        }
+    chosen = {role: name for role, name in (receivers or {}).items() if name}
+    for place, stage in enumerate(stages):
+        last = place == len(stages) - 1
+        own = run if last else stage.spec.name
+        try:
+            found = [
+                (port, _find(port, stage.spec.name, list(depths), chosen))
+                for port in stage.spec.inputs
+            ]
+        except MissingChannelError:
+            if last or not _recorded_already(stage, stages[place + 1 :], own, recorded, chosen):
+                raise
+            continue
+        inputs = {port.name: topic for port, topic in found if topic is not None}
+        named = dict(chosen)
+        for port, topic in found:
+            if topic is not None:
+                named.setdefault(port.role, port.channel.parts(topic).get("receiver", ""))
+        if not last and _recorded_already(stage, stages[place + 1 :], own, recorded, named):
+            continue
         depth = 1 + max((depths[topic] for topic in inputs.values()), default=0)
-        outputs = {spec.name: spec.at(run=run) for spec in stage.spec.outputs}
-        for spec in stage.spec.outputs:
-            if not spec.matches(outputs[spec.name]):
+        outputs = {port.name: _topic(port, own, named) for port in stage.spec.outputs}
+        for port in stage.spec.outputs:
+            if not port.channel.matches(outputs[port.name]):
                 raise UsageError(
                     f"a run cannot be named {run!r}", mend="--set name=NAME, without a slash"
                 )
@@ -85,13 +108,54 @@ def bind(
     return tuple(nodes)
 
 
-def _find(spec: ChannelSpec, stage: str, topics: Sequence[str], receiver: str) -> str:
+def _topic(port: Port, run: str, receivers: Mapping[str, str]) -> str:
+    return port.channel.at(run=run, receiver=receivers.get(port.role, ""))
+
+
+def _recorded_already(
+    stage: Stage[Any],
+    later: Sequence[Stage[Any]],
+    run: str,
+    recorded: Mapping[str, int],
+    receivers: Mapping[str, str],
+) -> bool:
+    """Whether the log has every output of a stage that later ones cannot do without."""
+    wanted = {
+        (port.channel.name, port.role, port.run)
+        for other in later
+        for port in other.spec.inputs
+        if not port.optional
+    }
+    needed = [
+        port
+        for port in stage.spec.outputs
+        if (port.channel.name, port.role, run if "{run}" in port.channel.topic else "") in wanted
+    ]
+    names = {role: receivers.get(role) or _USUAL[role] for role in _USUAL}
+    return bool(needed) and all(_topic(port, run, names) in recorded for port in needed)
+
+
+def _find(
+    port: Port, stage: str, topics: Sequence[str], receivers: Mapping[str, str]
+) -> str | None:
+    spec = port.channel
     fitting = [topic for topic in topics if spec.matches(topic)]
-    if receiver and "{receiver}" in spec.topic:
-        fitting = [topic for topic in fitting if spec.parts(topic)[_RECEIVER] == receiver]
+    if port.run:
+        fitting = [topic for topic in fitting if spec.parts(topic).get("run") == port.run]
+    if "{receiver}" in spec.topic:
+        of = {spec.parts(topic)["receiver"]: topic for topic in fitting}
+        name = receivers.get(port.role, "")
+        if name:
+            fitting = [of[name]] if name in of else []
+        elif len(of) > 1:
+            others = {receivers.get(role) or usual for role, usual in _USUAL.items()}
+            others.discard(_USUAL[port.role])
+            fitting = [topic for receiver, topic in of.items() if receiver not in others]
     if len(fitting) == 1:
         return fitting[0]
     if not fitting:
+        if port.optional:
+            return None
         known = ", ".join(topics) or "none"
         raise MissingChannelError(
             f"{stage} needs a channel {spec.topic} ({spec.about})",
@@ -100,5 +164,5 @@ def _find(spec: ChannelSpec, stage: str, topics: Sequence[str], receiver: str) -
         )
     raise UsageError(
         f"{stage} can read any of {', '.join(fitting)}",
-        mend="choose one: --set gnss.receiver=NAME",
+        mend=f"choose one: --set gnss.{port.role}=NAME",
     )

@@ -28,7 +28,7 @@ from replay.log.columns import Columns, Ragged
 from replay.log.digest import ChannelDigest
 from replay.log.reader import LogReader
 from replay.schemas import replay_pb2
-from replay.stages.base import Context
+from replay.stages.base import BASE, RECEIVER, Context
 
 Progress = Callable[[float], None]
 
@@ -75,9 +75,10 @@ class Replayer:
             for topic, info in reader.channels.items()
             if channels.find(topic) not in (TRACE, CHECKPOINT)
         }
-        receiver = getattr(getattr(job.config, "gnss", None), "receiver", "")
+        section = getattr(job.config, "gnss", None)
+        receivers = {role: str(getattr(section, role, "")) for role in (RECEIVER, BASE)}
         name = str(getattr(job.config, "name", job.pipeline))
-        self.nodes = bind(stages, self._depths(), run=name, receiver=receiver)
+        self.nodes = bind(stages, self._depths(), run=name, receivers=receivers)
         self.traces = [StageTrace(node) for node in self.nodes]
         self.states = [self._start(node) for node in self.nodes]
         self.depth = 1 + max(node.depth for node in self.nodes)
@@ -160,7 +161,7 @@ class Replayer:
         for topic, info in self.recorded.items():
             announce_as_recorded(sink, topic, info)
         for node in self.nodes:
-            specs = {spec.name: spec for spec in node.stage.spec.outputs}
+            specs = {port.name: port.channel for port in node.stage.spec.outputs}
             for name, topic in node.outputs.items():
                 sink.add_channel(topic, specs[name].message, depth=node.depth)
         sink.add_channel(TRACE.topic, TRACE.message, depth=self.depth)
@@ -204,7 +205,7 @@ class Replayer:
 
     @staticmethod
     def _encoded(node: Node, outputs: Mapping[str, Columns]) -> dict[str, Columns]:
-        specs = {spec.name: spec for spec in node.stage.spec.outputs}
+        specs = {port.name: port.channel for port in node.stage.spec.outputs}
         return {
             node.outputs[name]: encoded(specs[name], columns) for name, columns in outputs.items()
         }

@@ -21,6 +21,8 @@ class MeasurementKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     MEASUREMENT_KIND_PSEUDORANGE: _ClassVar[MeasurementKind]
     MEASUREMENT_KIND_CARRIER_PHASE: _ClassVar[MeasurementKind]
     MEASUREMENT_KIND_DOPPLER: _ClassVar[MeasurementKind]
+    MEASUREMENT_KIND_TIME_DIFFERENCED_PHASE: _ClassVar[MeasurementKind]
+    MEASUREMENT_KIND_DISPLACEMENT: _ClassVar[MeasurementKind]
 
 class MeasurementAxis(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -46,6 +48,17 @@ class EventKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     EVENT_KIND_TIME_BACKWARD: _ClassVar[EventKind]
     EVENT_KIND_NOT_FINITE: _ClassVar[EventKind]
     EVENT_KIND_RESET: _ClassVar[EventKind]
+    EVENT_KIND_SATELLITE_EXCLUDED: _ClassVar[EventKind]
+    EVENT_KIND_NO_EPHEMERIS: _ClassVar[EventKind]
+    EVENT_KIND_TOO_FEW_SATELLITES: _ClassVar[EventKind]
+    EVENT_KIND_NOT_CONVERGED: _ClassVar[EventKind]
+    EVENT_KIND_CYCLE_SLIP: _ClassVar[EventKind]
+    EVENT_KIND_SLIP_REPAIRED: _ClassVar[EventKind]
+    EVENT_KIND_CHAIN_BROKEN: _ClassVar[EventKind]
+    EVENT_KIND_AMBIGUITIES_FIXED: _ClassVar[EventKind]
+    EVENT_KIND_AMBIGUITIES_LOST: _ClassVar[EventKind]
+    EVENT_KIND_CLOCK_JUMP: _ClassVar[EventKind]
+    EVENT_KIND_BASE_LOST: _ClassVar[EventKind]
 MEASUREMENT_KIND_UNKNOWN: MeasurementKind
 MEASUREMENT_KIND_POSITION: MeasurementKind
 MEASUREMENT_KIND_VELOCITY: MeasurementKind
@@ -56,6 +69,8 @@ MEASUREMENT_KIND_HEADING: MeasurementKind
 MEASUREMENT_KIND_PSEUDORANGE: MeasurementKind
 MEASUREMENT_KIND_CARRIER_PHASE: MeasurementKind
 MEASUREMENT_KIND_DOPPLER: MeasurementKind
+MEASUREMENT_KIND_TIME_DIFFERENCED_PHASE: MeasurementKind
+MEASUREMENT_KIND_DISPLACEMENT: MeasurementKind
 MEASUREMENT_AXIS_NONE: MeasurementAxis
 MEASUREMENT_AXIS_EAST: MeasurementAxis
 MEASUREMENT_AXIS_NORTH: MeasurementAxis
@@ -75,6 +90,17 @@ EVENT_KIND_IMU_GAP: EventKind
 EVENT_KIND_TIME_BACKWARD: EventKind
 EVENT_KIND_NOT_FINITE: EventKind
 EVENT_KIND_RESET: EventKind
+EVENT_KIND_SATELLITE_EXCLUDED: EventKind
+EVENT_KIND_NO_EPHEMERIS: EventKind
+EVENT_KIND_TOO_FEW_SATELLITES: EventKind
+EVENT_KIND_NOT_CONVERGED: EventKind
+EVENT_KIND_CYCLE_SLIP: EventKind
+EVENT_KIND_SLIP_REPAIRED: EventKind
+EVENT_KIND_CHAIN_BROKEN: EventKind
+EVENT_KIND_AMBIGUITIES_FIXED: EventKind
+EVENT_KIND_AMBIGUITIES_LOST: EventKind
+EVENT_KIND_CLOCK_JUMP: EventKind
+EVENT_KIND_BASE_LOST: EventKind
 
 class FilterState(_message.Message):
     __slots__ = ("position_ecef_m", "velocity_ecef_m_s", "q_body_to_ecef", "gyro_bias_body_rad_s", "accel_bias_body_m_s2", "gyro_scale_factor", "accel_scale_factor", "mounting_angles_rad", "non_slip_point_body_m", "squat_rad_s2_m")

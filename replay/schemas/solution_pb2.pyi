@@ -15,10 +15,20 @@ class SolutionStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SOLUTION_STATUS_PREDICTED: _ClassVar[SolutionStatus]
     SOLUTION_STATUS_UPDATED: _ClassVar[SolutionStatus]
     SOLUTION_STATUS_OUTAGE: _ClassVar[SolutionStatus]
+    SOLUTION_STATUS_SINGLE: _ClassVar[SolutionStatus]
+    SOLUTION_STATUS_DGNSS: _ClassVar[SolutionStatus]
+    SOLUTION_STATUS_FLOAT: _ClassVar[SolutionStatus]
+    SOLUTION_STATUS_FIXED: _ClassVar[SolutionStatus]
+    SOLUTION_STATUS_CHAINED: _ClassVar[SolutionStatus]
 SOLUTION_STATUS_UNKNOWN: SolutionStatus
 SOLUTION_STATUS_PREDICTED: SolutionStatus
 SOLUTION_STATUS_UPDATED: SolutionStatus
 SOLUTION_STATUS_OUTAGE: SolutionStatus
+SOLUTION_STATUS_SINGLE: SolutionStatus
+SOLUTION_STATUS_DGNSS: SolutionStatus
+SOLUTION_STATUS_FLOAT: SolutionStatus
+SOLUTION_STATUS_FIXED: SolutionStatus
+SOLUTION_STATUS_CHAINED: SolutionStatus
 
 class Solution(_message.Message):
     __slots__ = ("position_ecef_m", "velocity_enu_m_s", "attitude_rad", "angular_rate_body_rad_s", "position_covariance_enu_m2", "velocity_std_enu_m_s", "attitude_std_rad", "status")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Protocol, TypeVar
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,37 @@ from replay.configuration import Section
 from replay.log.columns import Columns
 
 StateT = TypeVar("StateT")
+
+
+RECEIVER: Final = "receiver"
+BASE: Final = "base"
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Port:
+    """One channel that a stage reads or writes.
+
+    Attributes
+    ----------
+    channel : ChannelSpec
+    role : str
+        What part the receiver in the topic plays: the configuration's `gnss` section
+        names the receiver of each role.
+    run : str
+        Of an input, the stage whose run the topic speaks of; empty for the run itself.
+    optional : bool
+        Of an input: the stage does without where the log lacks it.
+    """
+
+    channel: ChannelSpec
+    role: str = RECEIVER
+    run: str = ""
+    optional: bool = False
+
+    @property
+    def name(self) -> str:
+        """Key in blocks, outputs and contexts: `OBS`, or `base.OBS` for another role."""
+        return self.channel.name if self.role == RECEIVER else f"{self.role}.{self.channel.name}"
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -28,18 +59,16 @@ class StageSpec:
     name : str
     version : int
         Raised with every change that alters an output.
-    inputs : tuple of ChannelSpec
-        The log must have each of them.
-    outputs : tuple of ChannelSpec
-    trigger : ChannelSpec
+    inputs, outputs : tuple of Port
+    trigger : Port
         The input whose rows end a step; the trace has one row per step.
     """
 
     name: str
     version: int
-    inputs: tuple[ChannelSpec, ...]
-    outputs: tuple[ChannelSpec, ...]
-    trigger: ChannelSpec
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    trigger: Port
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -48,10 +77,10 @@ class Context:
 
     Attributes
     ----------
-    topics : mapping of ChannelSpec.name to topic
+    topics : mapping of Port.name to topic
         Inputs and outputs.
-    heads : mapping of ChannelSpec.name to Columns
-        The first rows of each input, however the log is cut: for nominal intervals.
+    heads : mapping of Port.name to Columns
+        The first rows of each recorded input, however the log is cut: for nominal intervals.
     """
 
     topics: Mapping[str, str]
@@ -59,10 +88,10 @@ class Context:
 
 
 Block = Mapping[str, Columns]
-"""Rows by ChannelSpec.name. A channel without rows in the block is not in it."""
+"""Rows by Port.name. A channel without rows in the block is not in it."""
 
 Outputs = dict[str, Columns]
-"""Rows by ChannelSpec.name, whose log times lie within the block or at its end."""
+"""Rows by Port.name, whose log times lie within the block or at its end."""
 
 
 class Stage(Protocol[StateT]):

@@ -18,7 +18,7 @@ from replay.errors import ConfigurationError, DataError
 from replay.ins.states import state_names
 from replay.kernels import loose, records
 from replay.log.columns import Columns, Ragged
-from replay.stages.base import Block, Context, Outputs, StageSpec, dump_arrays, restore_arrays
+from replay.stages.base import Block, Context, Outputs, Port, StageSpec, dump_arrays, restore_arrays
 from replay.stages.loose_config import LooseConfig
 
 Array = np.ndarray[Any, Any]
@@ -64,15 +64,15 @@ class GnssInsLoose:
     spec = StageSpec(
         name="gnss-ins-lc",
         version=1,
-        inputs=(channels.IMU, channels.GNSS_FIX),
+        inputs=(Port(channels.IMU), Port(channels.GNSS_FIX)),
         outputs=(
-            channels.FILTER_INNOVATIONS,
-            channels.FILTER_STATE,
-            channels.FILTER_COVARIANCE,
-            channels.FILTER_EVENTS,
-            channels.SOLUTION,
+            Port(channels.FILTER_INNOVATIONS),
+            Port(channels.FILTER_STATE),
+            Port(channels.FILTER_COVARIANCE),
+            Port(channels.FILTER_EVENTS),
+            Port(channels.SOLUTION),
         ),
-        trigger=channels.GNSS_FIX,
+        trigger=Port(channels.GNSS_FIX),
     )
 
     def start(self, config: Section, context: Context) -> LooseState:
