@@ -74,6 +74,10 @@ class ChannelSpec:
     key: tuple[str, ...] = ()
     tolerances: Mapping[str, Tolerance] = dataclasses.field(default_factory=dict)
 
+    def __hash__(self) -> int:
+        """By name: a mapping of tolerances has no hash."""
+        return hash(self.name)
+
     def at(self, **parts: str) -> str:
         """Topic with its parts filled in."""
         return self.topic.format(**parts)
@@ -208,6 +212,17 @@ CORRECTIONS: Final = ChannelSpec(
         "hydrostatic_mapping": Tolerance(1e-6, "1"),
         "wet_mapping": Tolerance(1e-6, "1"),
         "shapiro_m": _M,
+    },
+)
+COARSE: Final = ChannelSpec(
+    "COARSE",
+    "/gnss/{receiver}/coarse",
+    "replay.CoarsePosition",
+    "position and clock that orbits and corrections were computed with",
+    tolerances={
+        "position_ecef_m": _M,
+        "clock_offset_m": _M,
+        "age_s": Tolerance(1e-9, "s"),
     },
 )
 GNSS_EVENTS: Final = ChannelSpec(
@@ -393,6 +408,7 @@ CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     TRUTH,
     SATELLITES,
     CORRECTIONS,
+    COARSE,
     GNSS_EVENTS,
     SLIPS,
     DISPLACEMENT,

@@ -57,6 +57,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     },
     "rad/(m/s^2)": {"rad/(m/s^2)": 1.0, "deg/(m/s^2)": _DEG, "deg/g": _DEG / STANDARD_GRAVITY_M_S2},
     "Hz": {"Hz": 1.0, "kHz": 1e3},
+    "dB-Hz": {"dB-Hz": 1.0},
 }
 
 _QUANTITY = re.compile(

@@ -12,6 +12,9 @@ from replay.errors import UsageError
 from replay.stages.base import Stage
 from replay.stages.gnss_ins_lc import GnssInsLoose
 from replay.stages.loose_config import LooseConfig
+from replay.stages.satellites import Satellites
+from replay.stages.spp import SinglePoint
+from replay.stages.spp_config import SppConfig
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -41,6 +44,12 @@ _ALL: Final = (
         "loosely coupled GNSS/INS: position and velocity fixes with inertial samples",
         LooseConfig,
         lambda: (GnssInsLoose(),),
+    ),
+    Pipeline(
+        "spp",
+        "single-point positioning: pseudoranges to position, Doppler to velocity",
+        SppConfig,
+        lambda: (Satellites(), SinglePoint()),
     ),
 )
 

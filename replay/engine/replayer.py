@@ -200,8 +200,17 @@ class Replayer:
     def _finish(self, sink: Sink) -> None:
         rows: dict[str, Columns] = {}
         for node, state in zip(self.nodes, self.states, strict=True):
-            rows.update(self._encoded(node, node.stage.finish(state)))
-        self._write(rows, [trace.finish() for trace in self.traces], sink)
+            rows.update(self._encoded(node, self._at_end(node.stage.finish(state))))
+        self._write(rows, [trace.finish(self._last_ns) for trace in self.traces], sink)
+
+    def _at_end(self, outputs: Mapping[str, Columns]) -> dict[str, Columns]:
+        """What a stage says after the log's last row comes no earlier than that row."""
+        return {
+            name: dataclasses.replace(
+                rows, log_time_ns=np.maximum(rows.log_time_ns, np.int64(self._last_ns))
+            )
+            for name, rows in outputs.items()
+        }
 
     @staticmethod
     def _encoded(node: Node, outputs: Mapping[str, Columns]) -> dict[str, Columns]:

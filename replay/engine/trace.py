@@ -62,11 +62,11 @@ class StageTrace:
                 self.last_log_t = max(self.last_log_t, int(rows[topic].log_time_ns[-1]))
         return self._rows(times, inputs, outputs)
 
-    def finish(self) -> Columns | None:
-        """One more step for what followed the last trigger."""
+    def finish(self, at_ns: int) -> Columns | None:
+        """One more step for what followed the last trigger, at the end of the log (GPS ns)."""
         if self.last_log_t < 0:
             return None
-        times = np.array([self.last_log_t], dtype=np.int64)
+        times = np.array([at_ns], dtype=np.int64)
         inputs = self._at(self.node.inputs.values(), {}, times)
         outputs = self._at(self.node.outputs.values(), {}, times)
         return self._rows(times, inputs, outputs)

@@ -66,6 +66,18 @@ class SatelliteSight(_message.Message):
     health: int
     def __init__(self, satellite: _Optional[str] = ..., position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., velocity_ecef_m_s: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., clock_s: _Optional[float] = ..., clock_drift_s_s: _Optional[float] = ..., elevation_rad: _Optional[float] = ..., azimuth_rad: _Optional[float] = ..., range_std_m: _Optional[float] = ..., ephemeris_age_s: _Optional[float] = ..., issue: _Optional[int] = ..., health: _Optional[int] = ...) -> None: ...
 
+class CoarsePosition(_message.Message):
+    __slots__ = ("position_ecef_m", "clock_offset_m", "age_s", "satellite_count")
+    POSITION_ECEF_M_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_OFFSET_M_FIELD_NUMBER: _ClassVar[int]
+    AGE_S_FIELD_NUMBER: _ClassVar[int]
+    SATELLITE_COUNT_FIELD_NUMBER: _ClassVar[int]
+    position_ecef_m: _geometry_pb2.Vector3
+    clock_offset_m: float
+    age_s: float
+    satellite_count: int
+    def __init__(self, position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., clock_offset_m: _Optional[float] = ..., age_s: _Optional[float] = ..., satellite_count: _Optional[int] = ...) -> None: ...
+
 class SignalCorrections(_message.Message):
     __slots__ = ("satellite", "signal", "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m", "ionosphere_m", "hydrostatic_m", "wet_m", "hydrostatic_mapping", "wet_mapping", "shapiro_m")
     SATELLITE_FIELD_NUMBER: _ClassVar[int]

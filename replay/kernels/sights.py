@@ -1,0 +1,518 @@
+"""Orbits, clocks and corrections of the satellites of each epoch.
+
+For every satellite: the broadcast message to use, its state at transmission, told in
+ECEF at reception, and each term between range and pseudorange. Elevation and
+atmosphere need the antenna's position to some metres; where it is not given, a
+least-squares position from plain ranges serves, which starts from the epoch before.
+"""
+
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from replay.kernels.atmosphere import (
+    BEIDOU_REFERENCE_HZ,
+    KLOBUCHAR_REFERENCE_HZ,
+    day_of_year,
+    klobuchar_b1i,
+    klobuchar_l1,
+    niell_hydrostatic,
+    niell_wet,
+    scale_ionosphere,
+    zenith_standard,
+)
+from replay.kernels.earth import enu_axes, geodetic
+from replay.kernels.elementary import log, sin, sqrt
+from replay.kernels.gnss_records import (
+    BEIDOU,
+    GALILEO,
+    SATELLITES,
+    SLOTS,
+    SYSTEMS,
+)
+from replay.kernels.least_squares import geometric_range, iterate, reduced_code
+from replay.kernels.orbits import (
+    SPEED_OF_LIGHT_M_S,
+    clock_polynomial,
+    group_delay,
+    relativistic_clock,
+    rotate_to_reception,
+    satellite_state,
+    transmission_offset,
+)
+from replay.kernels.sight import elevation_azimuth
+from replay.kernels.types import Array, Record
+
+SIGHTS_CONFIG_DTYPE: Final = np.dtype(
+    [
+        ("max_age", "<f8", SYSTEMS),  # s between reception and reference time
+        ("latest", "<i8"),  # 1: the message sent last, else the one nearest in time
+        ("fnav", "<i8"),  # 1: Galileo F/NAV before I/NAV
+        ("unhealthy", "<i8"),  # 1: use satellites that say they are unhealthy
+        ("ionosphere", "<i8"),  # 0 none, 1 Klobuchar for all, 2 each system's own
+        ("troposphere", "<i8"),  # 0 none, 1 Saastamoinen and Niell, 2 Saastamoinen and 1/sin
+        ("humidity", "<f8"),  # 0 to 1
+        ("shapiro", "<i8"),
+        ("fixed", "<i8"),  # 1: the antenna stands at `position`
+        ("position", "<f8", 3),  # m, ECEF
+        ("coast", "<f8"),  # s for which an old position serves
+    ],
+    align=True,
+)
+
+SIGHTS_STATE_DTYPE: Final = np.dtype(
+    [
+        ("x", "<f8", 3),  # m, ECEF: last coarse position
+        ("clock", "<f8", SYSTEMS),  # m
+        ("t", "<i8"),  # ns of the last coarse position, minus one before the first
+        ("alpha", "<f8", (2, 4)),  # broadcast ionosphere: Klobuchar, BeiDou
+        ("beta", "<f8", (2, 4)),
+        ("known", "<i8", 2),  # whether the log brought one
+        ("missing", "<i8", SATELLITES),  # 1 where the lack of a message has been told
+    ],
+    align=True,
+)
+
+EVENT_NO_EPHEMERIS: Final = 13
+EVENT_TOO_FEW: Final = 14
+EVENT_NOT_CONVERGED: Final = 15
+
+# A broadcast ionosphere: Klobuchar's is number 0, BeiDou's 1.
+IONOSPHERE_DTYPE: Final = np.dtype(
+    [("available", "<i8"), ("model", "<i8"), ("alpha", "<f8", 4), ("beta", "<f8", 4)], align=True
+)
+
+NOTE_DTYPE: Final = np.dtype(
+    [
+        ("t", "<i8"),
+        ("log_t", "<i8"),
+        ("kind", "<i8"),
+        ("satellite", "<i8"),  # minus one for none
+        ("value", "<f8"),
+    ],
+    align=True,
+)
+
+_EARTH_MU_M3_S2: Final = 3.986004418e14
+_DAY_S: Final = 86400
+_BEIDOU_LESS_GPS_S: Final = 14
+_UNUSABLE_DEG: Final = 0.017453292519943295  # one degree: below it nothing is modelled
+_OUTLIER_M: Final = 300.0
+
+
+@njit(cache=True)
+def choose_message(
+    messages: Array,
+    available: Array,
+    first: int,
+    end: int,
+    t: int,
+    log_t: int,
+    system: int,
+    cfg: Record,
+) -> int:
+    """Number of the broadcast message to use, or minus one.
+
+    Parameters
+    ----------
+    messages : array of EPHEMERIS_DTYPE
+        Those of one satellite stand from `first` to `end`.
+    available : int64 array, ns
+        Log time of each: a later one is not known yet.
+    t, log_t : int, ns
+        Of the epoch.
+    system : int
+    cfg : record of SIGHTS_CONFIG_DTYPE
+    """
+    best = -1
+    best_rank = 0
+    best_age = 0.0
+    limit = cfg["max_age"][system]
+    for k in range(first, end):
+        if available[k] > log_t:
+            continue
+        message = messages[k]
+        if message["health"] != 0 and cfg["unhealthy"] == 0:
+            continue
+        age = (t - message["toe_ns"]) * 1e-9
+        if age > limit or age < -limit:
+            continue
+        rank = 0
+        if system == GALILEO:
+            source = message["source"]
+            is_fnav = source & 2 != 0 and source & 5 == 0
+            rank = 1 if is_fnav != (cfg["fnav"] == 1) else 0
+        distance = abs(age)
+        if cfg["latest"] == 1:
+            distance = (t - message["transmitted_ns"]) * 1e-9
+            if distance < 0.0:
+                distance = 1e9 - distance
+        if best < 0 or rank < best_rank or (rank == best_rank and distance <= best_age):
+            best = k
+            best_rank = rank
+            best_age = distance
+    return best
+
+
+@njit(cache=True)
+def locate(row: Record, message: Record, t: int, state: Array) -> bool:
+    """Satellite's state at transmission, by the pseudorange of its first filled slot.
+
+    The position is left in ECEF at transmission; False where there is no pseudorange.
+    """
+    code = row["code"][0]
+    for slot in range(1, SLOTS):
+        if code != code:
+            code = row["code"][slot]
+    if code != code or not 1e6 < code < 1e9:
+        return False
+    offset = transmission_offset(message, t, code)
+    satellite_state(message, t, offset, state)
+    polynomial, rate = clock_polynomial(message, t, offset)
+    relativity, relative_rate = relativistic_clock(message, t, offset)
+    for i in range(3):
+        row["position"][i] = state[i]
+        row["velocity"][i] = state[3 + i]
+    row["polynomial"] = polynomial * SPEED_OF_LIGHT_M_S
+    row["relativity"] = relativity * SPEED_OF_LIGHT_M_S
+    row["clock"] = (polynomial + relativity) * SPEED_OF_LIGHT_M_S
+    row["drift"] = (rate + relative_rate) * SPEED_OF_LIGHT_M_S
+    row["age"] = (t - message["toe_ns"]) * 1e-9
+    row["issue"] = message["iode"]
+    row["health"] = message["health"]
+    row["range_std"] = message["accuracy_m"]
+    for slot in range(SLOTS):
+        if row["signal"][slot] != 0:
+            delay = group_delay(message, row["signal"][slot] % 256 - 48)
+            row["group_delay"][slot] = delay * SPEED_OF_LIGHT_M_S
+    return True
+
+
+@njit(cache=True)
+def to_reception(row: Record, x: Array, state: Array, u: Array) -> float:
+    """Turn position and velocity into ECEF at reception; the range (m), line of sight in `u`.
+
+    `distance` and `sagnac` are filled. Two rounds of the light-time equation leave less
+    than a micrometre.
+    """
+    distance = geometric_range(row, x, u)
+    travel = distance / SPEED_OF_LIGHT_M_S
+    for _ in range(2):
+        for i in range(3):
+            state[i] = row["position"][i]
+            state[3 + i] = row["velocity"][i]
+        rotate_to_reception(travel, state)
+        dx, dy, dz = state[0] - x[0], state[1] - x[1], state[2] - x[2]
+        travel = sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT_M_S
+    for i in range(3):
+        row["position"][i] = state[i]
+        row["velocity"][i] = state[3 + i]
+    turned = geometric_range(row, x, u)
+    row["distance"] = distance
+    row["sagnac"] = turned - distance
+    return turned
+
+
+@njit(cache=True)
+def _coarse(
+    rows: Array,
+    s: Record,
+    cfg: Record,
+    t: int,
+    observed: Array,
+    weight: Array,
+    work: Record,
+    u: Array,
+) -> int:
+    """Position to some metres from ranges and clocks; as `iterate` answers."""
+    n = rows.shape[0]
+    x = s["x"]
+    cold = s["t"] < 0
+    for k in range(n):
+        row = rows[k]
+        usable = row["seen"] == 1 and row["code"][0] == row["code"][0]
+        weight[k] = 1.0 if usable else 0.0
+        if usable:
+            observed[k] = row["code"][0] + row["clock"]
+            delay = row["group_delay"][0]
+            if delay == delay:
+                observed[k] -= delay
+            if not cold:
+                # What the Earth turns during the flight, to first order.
+                wx, wy = row["position"][0], row["position"][1]
+                observed[k] -= (7.2921151467e-5 / SPEED_OF_LIGHT_M_S) * (wx * x[1] - wy * x[0])
+    if cold:
+        for i in range(3):
+            x[i] = 0.0
+    status = 0
+    for attempt in range(4):
+        status = iterate(rows, observed, weight, 12, 1.0, x, s["clock"], work, u)
+        if status < 0:
+            return status
+        if cold and attempt == 0:
+            # The first position brings the Earth's turn, which moves it some tens of metres.
+            for k in range(n):
+                wx, wy = rows[k]["position"][0], rows[k]["position"][1]
+                observed[k] -= (7.2921151467e-5 / SPEED_OF_LIGHT_M_S) * (wx * x[1] - wy * x[0])
+            continue
+        worst, place, used = 0.0, -1, 0
+        for k in range(n):
+            if weight[k] > 0.0:
+                used += 1
+                system = rows[k]["system"]
+                z = observed[k] - geometric_range(rows[k], x, u) - s["clock"][system]
+                if abs(z) > worst:
+                    worst = abs(z)
+                    place = k
+        if worst < _OUTLIER_M or used <= work["unknowns"]:
+            break
+        weight[place] = 0.0
+    return status
+
+
+@njit(cache=True)
+def model_atmosphere(row: Record, x: Array, t: int, s: Record, cfg: Record, place: Array) -> None:
+    """Ionosphere, troposphere and relativity of the path.
+
+    `place` (4,): latitude, longitude (rad), height (m), day of year.
+    """
+    elevation = row["elevation"]
+    if elevation < _UNUSABLE_DEG:
+        return
+    latitude, longitude, height = place[0], place[1], place[2]
+    if cfg["ionosphere"] != 0:
+        second = (t // 1_000_000_000) % _DAY_S + (t % 1_000_000_000) * 1e-9
+        if cfg["ionosphere"] == 2 and row["system"] == BEIDOU and s["known"][1] == 1:
+            reference = BEIDOU_REFERENCE_HZ
+            delay = klobuchar_b1i(
+                s["alpha"][1], s["beta"][1], latitude, longitude, elevation, row["azimuth"],
+                second - _BEIDOU_LESS_GPS_S,
+            )  # fmt: skip
+        else:
+            reference = KLOBUCHAR_REFERENCE_HZ
+            delay = klobuchar_l1(
+                s["alpha"][0], s["beta"][0], latitude, longitude, elevation, row["azimuth"], second
+            )
+        for slot in range(SLOTS):
+            if row["signal"][slot] != 0:
+                row["ionosphere"][slot] = scale_ionosphere(delay, reference, row["frequency"][slot])
+    if cfg["troposphere"] != 0 and -500.0 < height < 15000.0:
+        dry, wet = zenith_standard(latitude, height, cfg["humidity"])
+        if cfg["troposphere"] == 1:
+            dry_map = niell_hydrostatic(elevation, latitude, height, place[3])
+            wet_map = niell_wet(elevation, latitude)
+        else:
+            dry_map = 1.0 / sin(elevation)
+            wet_map = dry_map
+        row["hydrostatic_mapping"] = dry_map
+        row["wet_mapping"] = wet_map
+        row["hydrostatic"] = dry * dry_map
+        row["wet"] = wet * wet_map
+    if cfg["shapiro"] == 1:
+        position = row["position"]
+        a = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+        b = sqrt(position[0] * position[0] + position[1] * position[1] + position[2] * position[2])
+        r = row["distance"] + row["sagnac"]
+        # Petit and Luzum (2010), IERS Conventions, eq. 11.17.
+        factor = 2.0 * _EARTH_MU_M3_S2 / (SPEED_OF_LIGHT_M_S * SPEED_OF_LIGHT_M_S)
+        row["shapiro"] = factor * log((a + b + r) / (a + b - r))
+
+
+@njit(cache=True)
+def note(
+    notes: Array, counts: Array, t: int, log_t: int, kind: int, sat: int, value: float
+) -> None:
+    """Append one event; beyond the room that there is, only count it."""
+    if counts[0] < notes.shape[0]:
+        row = notes[counts[0]]
+        row["t"] = t
+        row["log_t"] = log_t
+        row["kind"] = kind
+        row["satellite"] = sat
+        row["value"] = value
+        counts[0] += 1
+    else:
+        counts[1] += 1
+
+
+@njit(cache=True)
+def _place_epoch(
+    epoch: Record,
+    rows: Array,
+    s: Record,
+    cfg: Record,
+    observed: Array,
+    weight: Array,
+    work: Record,
+    u: Array,
+) -> None:
+    """Say where the epoch was: the coarse position once more, now with every correction."""
+    fresh = s["t"] == epoch["t"]
+    used = 0
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        usable = row["seen"] == 1 and weight[k] > 0.0 and fresh and cfg["fixed"] == 0
+        z = reduced_code(row, 0)
+        sine = sin(row["elevation"])
+        weight[k] = sine * sine if usable and sine > 0.1 and z == z else 0.0
+        observed[k] = z
+        if weight[k] > 0.0:
+            used += 1
+    for i in range(3):
+        epoch["x"][i] = s["x"][i]
+    epoch["age"] = (epoch["t"] - s["t"]) * 1e-9
+    epoch["used"] = used
+    epoch["placed"] = 1
+    if cfg["fixed"] == 1:
+        _fixed_clock(epoch, rows, u)
+        return
+    if fresh and iterate(rows, observed, weight, 3, 1.0, epoch["x"], s["clock"], work, u) > 0:
+        for i in range(3):
+            s["x"][i] = epoch["x"][i]
+    else:
+        for i in range(3):
+            epoch["x"][i] = s["x"][i]
+    for system in range(SYSTEMS - 1, -1, -1):
+        if work["column"][system] > 0:
+            epoch["clock"] = s["clock"][system]
+
+
+@njit(cache=True)
+def _fixed_clock(epoch: Record, rows: Array, u: Array) -> None:
+    """Clock of a receiver that stands at a known position: the mean over its ranges."""
+    total, used = 0.0, 0
+    for k in range(rows.shape[0]):
+        z = reduced_code(rows[k], 0)
+        if rows[k]["seen"] == 1 and z == z:
+            total += z - geometric_range(rows[k], epoch["x"], u)
+            used += 1
+    epoch["used"] = used
+    epoch["clock"] = total / used if used > 0 else 0.0
+    epoch["placed"] = 1 if used > 0 else 0
+
+
+@njit(cache=True)
+def learn_ionosphere(s: Record, models: Array, first: int, log_t: int) -> int:
+    """Take the broadcast ionospheres that are known by now; how many were taken so far."""
+    k = first
+    while k < models.shape[0] and models[k]["available"] <= log_t:
+        model = models[k]["model"]
+        for i in range(4):
+            s["alpha"][model, i] = models[k]["alpha"][i]
+            s["beta"][model, i] = models[k]["beta"][i]
+        s["known"][model] = 1
+        k += 1
+    return k
+
+
+@njit(cache=True)
+def run_sights(
+    state: Array,
+    config: Array,
+    models: Array,
+    messages: Array,
+    available: Array,
+    starts: Array,
+    epochs: Array,
+    rows: Array,
+    scratch: Array,
+    notes: Array,
+    counts: Array,
+) -> int:
+    """Fill the rows of all epochs of a block.
+
+    Parameters
+    ----------
+    state, config, scratch : arrays of one record each
+        SIGHTS_STATE_DTYPE, SIGHTS_CONFIG_DTYPE, SOLVE_DTYPE.
+    models : array of IONOSPHERE_DTYPE
+        Not used yet, in the order of their arrival.
+    messages : array of EPHEMERIS_DTYPE
+        Grouped by satellite.
+    available : int64 array, ns
+        Log time of each message.
+    starts : int64 array (SATELLITES + 1,)
+        Where each satellite's messages begin.
+    epochs, rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
+        `seen` becomes 1 where everything is known.
+    notes : array of NOTE_DTYPE
+    counts : int64 array (2,)
+        Notes written; notes for which there was no room.
+
+    Returns
+    -------
+    int
+        How many of the models were taken; the others are later than the epochs.
+    """
+    taken = 0
+    s, cfg, work = state[0], config[0], scratch[0]
+    u = np.zeros(3)
+    sat_state = np.zeros(8)
+    place = np.zeros(4)
+    observed = np.zeros(SATELLITES)
+    weight = np.zeros(SATELLITES)
+    for e in range(epochs.shape[0]):
+        t, log_t = epochs[e]["t"], epochs[e]["log_t"]
+        taken = learn_ionosphere(s, models, taken, log_t)
+        part = rows[epochs[e]["first"] : epochs[e]["first"] + epochs[e]["count"]]
+        for k in range(part.shape[0]):
+            row = part[k]
+            sat = row["satellite"]
+            chosen = choose_message(
+                messages, available, starts[sat], starts[sat + 1], t, log_t, row["system"], cfg
+            )
+            if chosen < 0:
+                if s["missing"][sat] == 0:
+                    s["missing"][sat] = 1
+                    note(notes, counts, t, log_t, EVENT_NO_EPHEMERIS, sat, 0.0)
+                continue
+            s["missing"][sat] = 0
+            if locate(row, messages[chosen], t, sat_state):
+                row["seen"] = 1
+        epoch = epochs[e]
+        epoch["placed"] = 0
+        if cfg["fixed"] == 1:
+            for i in range(3):
+                s["x"][i] = cfg["position"][i]
+            s["t"] = t
+        else:
+            status = _coarse(part, s, cfg, t, observed, weight, work, u)
+            if status > 0:
+                s["t"] = t
+            else:
+                kind = EVENT_TOO_FEW if status == -1 else EVENT_NOT_CONVERGED
+                known = s["t"] >= 0 and (t - s["t"]) * 1e-9 <= cfg["coast"]
+                if status != -1 or not known:
+                    # A failed solution leaves no position to go on from.
+                    s["t"] = -1
+                    for i in range(SYSTEMS):
+                        s["clock"][i] = 0.0
+                    note(notes, counts, t, log_t, kind, -1, float(part.shape[0]))
+                    for k in range(part.shape[0]):
+                        part[k]["seen"] = 0
+                    continue
+        x = s["x"]
+        place[0], place[1], place[2] = geodetic(x[0], x[1], x[2])
+        place[3] = day_of_year(t)
+        enu_axes(x[0], x[1], x[2], work["axes"])
+        for k in range(part.shape[0]):
+            row = part[k]
+            if row["seen"] == 1:
+                to_reception(row, x, sat_state, u)
+                row["elevation"], row["azimuth"] = elevation_azimuth(work["axes"], u[0], u[1], u[2])
+                model_atmosphere(row, x, t, s, cfg, place)
+        _place_epoch(epoch, part, s, cfg, observed, weight, work, u)
+    return taken
+
+
+def new_sights_state(alpha: Array, beta: Array) -> Array:
+    """One state record of a stage that has seen nothing.
+
+    Klobuchar's coefficients `alpha`, `beta` (4,) serve until the log brings some.
+    """
+    state = np.zeros(1, dtype=SIGHTS_STATE_DTYPE)
+    state["t"] = -1
+    state["alpha"][0, 0] = alpha
+    state["beta"][0, 0] = beta
+    return state

@@ -1,0 +1,335 @@
+"""Orbits, clocks and corrections of what a receiver tracks: observations and messages in.
+
+Outputs are channels of their own, so that every later stage can be run again from
+them, and every term can be looked at. The arithmetic is in :mod:`replay.kernels.sights`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.configuration import Section
+from replay.errors import ConfigurationError
+from replay.gnss.ephemerides import ephemeris_records
+from replay.gnss.measurements import (
+    SATELLITE_NAMES,
+    Epochs,
+    Selection,
+    gather_epochs,
+    select_signals,
+    signal_names,
+)
+from replay.kernels import sights
+from replay.kernels.ephemeris import EPHEMERIS_DTYPE
+from replay.kernels.gnss_records import COUNT, FIRST, SATELLITES, SYSTEM_LETTERS
+from replay.kernels.least_squares import SOLVE_DTYPE
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
+from replay.log.columns import Columns
+from replay.schemas import navigation_pb2
+from replay.stages.base import (
+    BASE,
+    RECEIVER,
+    Block,
+    Context,
+    Outputs,
+    Port,
+    StageSpec,
+    dump_arrays,
+    restore_arrays,
+)
+from replay.stages.gnss_columns import EVENT_TEXT, event_columns
+from replay.stages.gnss_config import GnssConfig
+
+Array = np.ndarray[Any, Any]
+
+_IONOSPHERES: Final = ("none", "klobuchar", "system")
+_TROPOSPHERES: Final = ("none", "niell", "cosecant")
+_MODELS: Final = {
+    ("G", int(navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR)): 0,
+    ("C", int(navigation_pb2.IONOSPHERE_MODEL_BEIDOU)): 1,
+}
+_NOTES_PER_EPOCH: Final = 8
+
+
+@dataclasses.dataclass(slots=True)
+class SatellitesState:
+    """Everything that crosses from one block to the next."""
+
+    selection: Selection
+    config: Array
+    kernel: Array
+    scratch: Array
+    models: Array
+    messages: Array
+    available: Array
+
+
+class Satellites:
+    """The stage `satellites`, for the rover or for the base.
+
+    Parameters
+    ----------
+    role : str
+        RECEIVER computes its own coarse position; BASE stands at a known one.
+    """
+
+    def __init__(self, role: str = RECEIVER) -> None:
+        self.role = role
+        observations = Port(channels.GNSS_OBS, role)
+        self.spec = StageSpec(
+            name="satellites" if role == RECEIVER else f"{role}-satellites",
+            version=1,
+            inputs=(
+                observations,
+                Port(channels.NAV),
+                Port(channels.NAV_IONOSPHERE, optional=True),
+                Port(channels.RECEIVER, role, optional=True),
+            ),
+            outputs=(
+                Port(channels.SATELLITES, role),
+                Port(channels.CORRECTIONS, role),
+                Port(channels.COARSE, role),
+                Port(channels.GNSS_EVENTS, role),
+            ),
+            trigger=observations,
+        )
+
+    def start(self, config: Section, context: Context) -> SatellitesState:
+        """State before the first row."""
+        if not isinstance(config, GnssConfig):
+            raise TypeError("satellites takes a GnssConfig")
+        record = _config_record(config)
+        if self.role == BASE:
+            record["fixed"] = 1
+            record["position"] = base_position(config, context)
+        return SatellitesState(
+            selection=select_signals(config.gnss.signals, config.gnss.systems),
+            config=record,
+            kernel=sights.new_sights_state(*_klobuchar(config)),
+            scratch=np.zeros(1, dtype=SOLVE_DTYPE),
+            models=np.zeros(0, dtype=sights.IONOSPHERE_DTYPE),
+            messages=np.zeros(0, dtype=EPHEMERIS_DTYPE),
+            available=np.zeros(0, dtype=np.int64),
+        )
+
+    def step(self, state: SatellitesState, block: Block) -> tuple[SatellitesState, Outputs]:
+        """Take a block of observations and messages."""
+        self._learn(state, block)
+        observations = block.get(Port(channels.GNSS_OBS, self.role).name)
+        if observations is None:
+            return state, {}
+        found = gather_epochs(observations, state.selection)
+        messages, available, starts = _by_satellite(state.messages, state.available)
+        notes = np.zeros(SATELLITES + _NOTES_PER_EPOCH * len(found.epochs), dtype=sights.NOTE_DTYPE)
+        counts = np.zeros(2, dtype=np.int64)
+        taken = sights.run_sights(
+            state.kernel, state.config, state.models, messages, available, starts,
+            found.epochs, found.rows, state.scratch, notes, counts,
+        )  # fmt: skip
+        state.models = state.models[taken:]
+        outputs: Outputs = {}
+        columns = {
+            channels.SATELLITES: _sight_columns(found),
+            channels.CORRECTIONS: _correction_columns(found),
+            channels.COARSE: _coarse_columns(found.epochs),
+            channels.GNSS_EVENTS: event_columns(notes[: counts[0]], EVENT_TEXT),
+        }
+        for channel, rows in columns.items():
+            if len(rows):
+                outputs[Port(channel, self.role).name] = rows
+        return state, outputs
+
+    def finish(self, state: SatellitesState) -> Outputs:
+        """Nothing is left to say."""
+        return {}
+
+    def dump(self, state: SatellitesState) -> bytes:
+        """The state as bytes."""
+        return dump_arrays(
+            {
+                "kernel": state.kernel,
+                "models": state.models,
+                "messages": state.messages,
+                "available": state.available,
+            }
+        )
+
+    def restore(self, state: SatellitesState, data: bytes) -> SatellitesState:
+        """The state of a dump."""
+        arrays = restore_arrays(
+            data,
+            {
+                "kernel": sights.SIGHTS_STATE_DTYPE,
+                "models": sights.IONOSPHERE_DTYPE,
+                "messages": EPHEMERIS_DTYPE,
+                "available": np.dtype(np.int64),
+            },
+        )
+        return dataclasses.replace(
+            state,
+            kernel=arrays["kernel"],
+            models=arrays["models"],
+            messages=arrays["messages"],
+            available=arrays["available"],
+        )
+
+    @staticmethod
+    def _learn(state: SatellitesState, block: Block) -> None:
+        """Keep the messages of a block; each is used from its log time on."""
+        nav = block.get(channels.NAV.name)
+        if nav is not None:
+            state.messages = np.concatenate([state.messages, ephemeris_records(nav)])
+            state.available = np.concatenate([state.available, nav.log_time_ns])
+        models = block.get(channels.NAV_IONOSPHERE.name)
+        if models is not None:
+            state.models = np.concatenate([state.models, _ionosphere_records(models)])
+
+
+def _ionosphere_records(models: Columns) -> Array:
+    """Klobuchar's and BeiDou's coefficients; a set that is not eight numbers is left out."""
+    coefficients = models.ragged("coefficients")
+    systems = models.ragged("system").texts()
+    rows = []
+    for k in range(len(models)):
+        values = coefficients.row(k).astype(np.float64)
+        place = _MODELS.get((systems[k], int(models["model"][k])))
+        if place is not None and len(values) == 8 and np.isfinite(values).all():
+            rows.append((int(models.log_time_ns[k]), place, values[:4], values[4:]))
+    return np.array(rows, dtype=sights.IONOSPHERE_DTYPE)
+
+
+def base_position(config: GnssConfig, context: Context) -> tuple[float, ...]:
+    """ECEF position of the base's antenna (m).
+
+    Raises
+    ------
+    ConfigurationError
+        Where neither the configuration nor the log has one.
+    """
+    given = config.antenna.base_position
+    if given:
+        if len(given) != 3:
+            raise ConfigurationError(
+                f"antenna.base_position has {len(given)} numbers", mend="give x, y, z in ECEF"
+            )
+        return given
+    port = Port(channels.RECEIVER, BASE)
+    info = context.heads.get(port.name)
+    if info is not None and len(info) and info.is_present("approximate_position_ecef_m")[0]:
+        position = info["approximate_position_ecef_m"][0]
+        return tuple(float(value) for value in position)
+    raise ConfigurationError(
+        "the position of the base is not known",
+        where=f"{context.topics.get(port.name, 'no channel ' + port.channel.topic)}",
+        mend="--set antenna.base_position=[X, Y, Z], ECEF in m",
+    )
+
+
+def _klobuchar(config: GnssConfig) -> tuple[Array, Array]:
+    """Coefficients for a log that brings none."""
+    for name in ("alpha", "beta"):
+        if len(getattr(config.atmosphere, name)) != 4:
+            raise ConfigurationError(f"atmosphere.{name} has four numbers")
+    return np.array(config.atmosphere.alpha), np.array(config.atmosphere.beta)
+
+
+def _config_record(config: GnssConfig) -> Array:
+    orbits, atmosphere = config.orbits, config.atmosphere
+    record = np.zeros(1, dtype=sights.SIGHTS_CONFIG_DTYPE)
+    if len(orbits.max_age) not in (1, len(SYSTEM_LETTERS)):
+        raise ConfigurationError(
+            f"orbits.max_age has one number or {len(SYSTEM_LETTERS)}, not {len(orbits.max_age)}"
+        )
+    record["max_age"] = orbits.max_age
+    record["latest"] = int(orbits.choice == "latest")
+    record["fnav"] = int(orbits.galileo == "fnav")
+    record["unhealthy"] = int(orbits.unhealthy)
+    record["ionosphere"] = _IONOSPHERES.index(atmosphere.ionosphere)
+    record["troposphere"] = _TROPOSPHERES.index(atmosphere.troposphere)
+    record["humidity"] = atmosphere.humidity
+    record["shapiro"] = int(atmosphere.shapiro)
+    record["coast"] = config.antenna.coast
+    return record
+
+
+def _by_satellite(messages: Array, available: Array) -> tuple[Array, Array, Array]:
+    """Messages grouped by satellite, those of one in the order of their arrival."""
+    system = np.full(128, -1, dtype=np.int64)
+    for place, letter in enumerate(SYSTEM_LETTERS):
+        system[ord(letter)] = place
+    place = system[messages["system"]]
+    known = (place >= 0) & (messages["prn"] >= 1) & (messages["prn"] <= np.array(COUNT)[place])
+    number = np.where(known, np.array(FIRST)[place] + messages["prn"] - 1, SATELLITES)
+    order = np.argsort(number, kind="stable")
+    starts = np.searchsorted(number[order], np.arange(SATELLITES + 1)).astype(np.int64)
+    return messages[order], available[order], starts
+
+
+def _sight_columns(found: Epochs) -> Columns:
+    epoch = np.repeat(np.arange(len(found.epochs)), found.epochs["count"])
+    seen = found.rows["seen"] == 1
+    rows, at = found.rows[seen], found.epochs[epoch[seen]]
+    return Columns.build(
+        at["t"],
+        {
+            "satellite": SATELLITE_NAMES[rows["satellite"]],
+            "position_ecef_m": np.ascontiguousarray(rows["position"]),
+            "velocity_ecef_m_s": np.ascontiguousarray(rows["velocity"]),
+            "clock_s": rows["clock"] / SPEED_OF_LIGHT_M_S,
+            "clock_drift_s_s": rows["drift"] / SPEED_OF_LIGHT_M_S,
+            "elevation_rad": np.ascontiguousarray(rows["elevation"]),
+            "azimuth_rad": np.ascontiguousarray(rows["azimuth"]),
+            "range_std_m": np.ascontiguousarray(rows["range_std"]),
+            "ephemeris_age_s": np.ascontiguousarray(rows["age"]),
+            "issue": rows["issue"].astype(np.int32),
+            "health": rows["health"].astype(np.int32),
+        },
+        log_time_ns=at["log_t"],
+    )
+
+
+def _coarse_columns(epochs: Array) -> Columns:
+    rows = epochs[epochs["placed"] == 1]
+    return Columns.build(
+        rows["t"],
+        {
+            "position_ecef_m": np.ascontiguousarray(rows["x"]),
+            "clock_offset_m": np.ascontiguousarray(rows["clock"]),
+            "age_s": np.ascontiguousarray(rows["age"]),
+            "satellite_count": rows["used"].astype(np.uint32),
+        },
+        log_time_ns=rows["log_t"],
+    )
+
+
+def _correction_columns(found: Epochs) -> Columns:
+    epoch = np.repeat(np.arange(len(found.epochs)), found.epochs["count"])
+    used = (found.rows["signal"] != 0) & (found.rows["seen"] == 1)[:, None]
+    row, slot = np.nonzero(used)
+    rows, at = found.rows[row], found.epochs[epoch[row]]
+    delay = rows["group_delay"][np.arange(len(rows)), slot] if len(rows) else np.zeros(0)
+    return Columns.build(
+        at["t"],
+        {
+            "satellite": SATELLITE_NAMES[rows["satellite"]],
+            "signal": signal_names(found.rows["signal"][row, slot]),
+            "distance_m": np.ascontiguousarray(rows["distance"]),
+            "sagnac_m": np.ascontiguousarray(rows["sagnac"]),
+            "satellite_clock_m": -rows["polynomial"],
+            "relativity_m": -rows["relativity"],
+            # Where the message does not tell, nothing is modelled.
+            "group_delay_m": np.where(np.isfinite(delay), delay, 0.0),
+            "ionosphere_m": found.rows["ionosphere"][row, slot],
+            "hydrostatic_m": np.ascontiguousarray(rows["hydrostatic"]),
+            "wet_m": np.ascontiguousarray(rows["wet"]),
+            "hydrostatic_mapping": np.ascontiguousarray(rows["hydrostatic_mapping"]),
+            "wet_mapping": np.ascontiguousarray(rows["wet_mapping"]),
+            "shapiro_m": np.ascontiguousarray(rows["shapiro"]),
+        },
+        log_time_ns=at["log_t"],
+        present={"shapiro_m": np.ascontiguousarray(rows["shapiro"] != 0.0)},
+    )
