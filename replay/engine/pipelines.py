@@ -11,10 +11,11 @@ from replay.configuration import Section
 from replay.errors import UsageError
 from replay.stages.base import Stage
 from replay.stages.gnss_ins_lc import GnssInsLoose
+from replay.stages.kfspp import FilteredSinglePoint
 from replay.stages.loose_config import LooseConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import SinglePoint
-from replay.stages.spp_config import SppConfig
+from replay.stages.spp_config import KfsppConfig, SppConfig
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -50,6 +51,12 @@ _ALL: Final = (
         "single-point positioning: pseudoranges to position, Doppler to velocity",
         SppConfig,
         lambda: (Satellites(), SinglePoint()),
+    ),
+    Pipeline(
+        "kfspp",
+        "filtered single-point positioning: constant velocity over code and Doppler",
+        KfsppConfig,
+        lambda: (Satellites(), FilteredSinglePoint()),
     ),
 )
 

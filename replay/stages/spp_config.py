@@ -42,3 +42,31 @@ class SppConfig(GnssConfig, frozen=True):
 
     name: str = "spp"
     spp: Spp = Spp()
+
+
+class Kfspp(Section, frozen=True):
+    """How the filter carries position, velocity and clocks from epoch to epoch.
+
+    Tang et al. (2021) print 0.05 for the spectral densities of velocity, clock and drift,
+    4.5 for the variance of a range and 0.18 for that of a range rate. A velocity density of
+    0.05 m^2/s^3 is a vehicle that hardly accelerates, and the clock's 0.05 m^2/s leaves
+    little to a quartz: the defaults here are a car's and a quartz's, the printed values
+    are to be had by `--set`.
+    """
+
+    code_sigma: Annotated[float, quantity("m", "of a pseudorange in the zenith")] = 2.0
+    doppler_sigma: Annotated[float, quantity("m/s", "of a range rate in the zenith")] = 0.1
+    velocity_noise: Annotated[float, quantity("1", "m^2/s^3, density of acceleration")] = 2.0
+    clock_noise: Annotated[float, quantity("1", "m^2/s, density of the clock")] = 0.05
+    drift_noise: Annotated[float, quantity("1", "m^2/s^3, density of its drift")] = 0.05
+    gate: Annotated[float, quantity("1", "innovation over its deviation; 0 lets all in")] = 5.0
+    gap: Annotated[float, quantity("s", "after which it begins anew")] = 10.0
+    jump: Annotated[float, quantity("m", "by which a clock has been set")] = 3000.0
+    rejections: int = 5
+
+
+class KfsppConfig(SppConfig, frozen=True):
+    """Settings of `kfspp`; weights and exclusions are those of the section `spp`."""
+
+    name: str = "kfspp"
+    kfspp: Kfspp = Kfspp()

@@ -1,0 +1,362 @@
+"""Filtered single-point positioning: constant velocity, clocks with drift, code and Doppler.
+
+States are position, velocity (ECEF) and, for each of the five systems, receiver clock
+and drift (m, m/s). Tang et al. (2021), eqs 6 to 9, has ten of them for two systems.
+"""
+
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from replay.kernels.dilution import dilutions
+from replay.kernels.earth import enu_axes
+from replay.kernels.elementary import sqrt
+from replay.kernels.gnss_records import SATELLITES, SYSTEMS
+from replay.kernels.kalman import scalar_update
+from replay.kernels.least_squares import geometric_range, reduced_code
+from replay.kernels.single_point import (
+    KIND_DOPPLER,
+    KIND_PSEUDORANGE,
+    SINGLE_CONFIG_DTYPE,
+    predicted_range_rate,
+    true_time,
+    usable,
+)
+from replay.kernels.types import Array, Record
+from replay.kernels.weighting import code_variance, noise_factor
+
+STATES: Final = 6 + 2 * SYSTEMS
+_CLOCK: Final = 6
+_DRIFT: Final = 6 + SYSTEMS
+
+KINEMATIC_CONFIG_DTYPE: Final = np.dtype(
+    [
+        ("single", SINGLE_CONFIG_DTYPE),
+        ("velocity_noise", "<f8"),  # m^2/s^3, spectral density of acceleration
+        ("clock_noise", "<f8"),  # m^2/s
+        ("drift_noise", "<f8"),  # m^2/s^3
+        ("gate", "<f8"),  # innovation over its deviation
+        ("gap", "<f8"),  # s after which it begins anew
+        ("jump", "<f8"),  # m by which a clock has jumped
+        ("rejections", "<i8"),  # epochs in a row, most of whose ranges are rejected
+    ],
+    align=True,
+)
+
+KINEMATIC_STATE_DTYPE: Final = np.dtype(
+    [
+        ("t", "<i8"),  # ns, true time of the state; minus one before the first
+        ("x", "<f8", STATES),
+        ("P", "<f8", (STATES, STATES)),
+        ("known", "<i8", SYSTEMS),  # whether a system's clock has been met
+        ("rejected", "<i8"),
+    ],
+    align=True,
+)
+
+EVENT_CLOCK_JUMP: Final = 21
+EVENT_RESET: Final = 11
+_WIDE_M2: Final = 1e8
+_NAN = float("nan")
+
+
+@njit(cache=True)
+def begin(s: Record, epoch: Record) -> None:
+    """Position and clock from the coarse ones, at rest, all uncertain."""
+    for i in range(STATES):
+        s["x"][i] = 0.0
+        for j in range(STATES):
+            s["P"][i, j] = 0.0
+    for i in range(3):
+        s["x"][i] = epoch["x"][i]
+        s["P"][i, i] = 1e4
+        s["P"][3 + i, 3 + i] = 1e4
+    for k in range(SYSTEMS):
+        s["known"][k] = 0
+        s["x"][_CLOCK + k] = epoch["clock"]
+        s["P"][_CLOCK + k, _CLOCK + k] = _WIDE_M2
+        s["P"][_DRIFT + k, _DRIFT + k] = 1e6
+    s["rejected"] = 0
+
+
+@njit(cache=True)
+def predict(s: Record, cfg: Record, dt: float) -> None:
+    """Carry state and covariance over `dt` (s): constant velocity, constant drift."""
+    x, P = s["x"], s["P"]
+    for i in range(3):
+        _pair(x, P, i, 3 + i, dt, 0.0, cfg["velocity_noise"])
+    for k in range(SYSTEMS):
+        _pair(x, P, _CLOCK + k, _DRIFT + k, dt, cfg["clock_noise"], cfg["drift_noise"])
+
+
+@njit(cache=True)
+def _pair(x: Array, P: Array, a: int, b: int, dt: float, first: float, second: float) -> None:
+    """Value `a` with rate `b`: Phi P Phi' and white noise on the value and on the rate."""
+    x[a] += dt * x[b]
+    for j in range(STATES):
+        P[a, j] += dt * P[b, j]
+    for j in range(STATES):
+        P[j, a] += dt * P[j, b]
+    P[a, a] += first * dt + second * dt * dt * dt / 3.0
+    P[a, b] += second * dt * dt / 2.0
+    P[b, a] = P[a, b]
+    P[b, b] += second * dt
+
+
+@njit(cache=True)
+def _use(
+    s: Record,
+    count: int,
+    z: float,
+    variance: float,
+    gate: float,
+    h: Array,
+    index: Array,
+    scratch: Array,
+    out: Record,
+) -> bool:
+    """One scalar measurement: gate, update, and what is to be said of it."""
+    P, x = s["P"], s["x"]
+    total = variance
+    for a in range(count):
+        for b in range(count):
+            total += h[a] * P[index[a], index[b]] * h[b]
+    deviation = sqrt(total)
+    out["z"] = z
+    out["s"] = deviation
+    out["r"] = sqrt(variance)
+    accepted = gate <= 0.0 or abs(z) <= gate * deviation
+    out["accepted"] = 1 if accepted else 0
+    if not accepted:
+        return False
+    inverse = 1.0 / sqrt(variance)
+    for a in range(count):
+        h[a] *= inverse
+    dx = scratch[0]
+    for i in range(STATES):
+        dx[i] = 0.0
+    scalar_update(P, STATES, h, index, count, z * inverse, dx, scratch[1], scratch[2])
+    for i in range(STATES):
+        x[i] += dx[i]
+    return True
+
+
+@njit(cache=True)
+def _describe(out: Record, epoch: Record, row: Record, kind: int) -> None:
+    out["t"] = epoch["t"]
+    out["log_t"] = epoch["log_t"]
+    out["kind"] = kind
+    out["satellite"] = row["satellite"]
+    out["signal"] = row["signal"][0]
+
+
+@njit(cache=True)
+def update_epoch(
+    s: Record,
+    cfg: Record,
+    epoch: Record,
+    rows: Array,
+    weight: Array,
+    innovations: Array,
+    counts: Array,
+    u: Array,
+    h: Array,
+    index: Array,
+    scratch: Array,
+) -> int:
+    """Use an epoch's ranges and range rates; how many ranges were believed.
+
+    `weight` (n,) becomes 1 for a satellite whose range was used.
+    """
+    single = cfg["single"]
+    x = s["x"]
+    used, offered = 0, 0
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        weight[k] = 0.0
+        if not usable(row, single):
+            continue
+        system = row["system"]
+        z = reduced_code(row, 0)
+        if z != z:
+            continue
+        z -= geometric_range(row, x[:3], u)
+        if s["known"][system] == 0:
+            s["known"][system] = 1
+            x[_CLOCK + system] = z
+        for i in range(3):
+            h[i] = -u[i]
+            index[i] = i
+        h[3] = 1.0
+        index[3] = _CLOCK + system
+        scale = single["system_scale"][system]
+        variance = code_variance(row, 0, single["code_sigma"] * scale, single["weight"])
+        out = innovations[counts[1]]
+        counts[1] += 1
+        offered += 1
+        _describe(out, epoch, row, KIND_PSEUDORANGE)
+        z -= x[_CLOCK + system]
+        if _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out):
+            weight[k] = 1.0
+            used += 1
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        rate = row["range_rate"][0]
+        if not usable(row, single) or rate != rate or single["velocity"] == 0:
+            continue
+        system = row["system"]
+        z = rate + row["drift"] - predicted_range_rate(row, x[:3], x[3:6], u) - x[_DRIFT + system]
+        for i in range(3):
+            h[i] = -u[i]
+            index[i] = 3 + i
+        h[3] = 1.0
+        index[3] = _DRIFT + system
+        sigma = single["doppler_sigma"]
+        model = single["weight"]["model"]
+        variance = sigma * sigma * noise_factor(model, row["elevation"], row["cn0"][0])
+        out = innovations[counts[1]]
+        counts[1] += 1
+        _describe(out, epoch, row, KIND_DOPPLER)
+        _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out)
+    if offered >= 4 and 2 * used < offered:
+        s["rejected"] += 1
+    else:
+        s["rejected"] = 0
+    return used
+
+
+@njit(cache=True)
+def emit(s: Record, epoch: Record, reference: int, axes: Array, out: Record) -> None:
+    """One solution: position, velocity, clocks and their uncertainty."""
+    x, P = s["x"], s["P"]
+    out["epoch_t"] = epoch["t"]
+    out["t"] = s["t"]
+    out["log_t"] = epoch["log_t"]
+    enu_axes(x[0], x[1], x[2], axes)
+    place = 0
+    for a in range(3):
+        out["r"][a] = x[a]
+        v, spread = 0.0, 0.0
+        for i in range(3):
+            v += axes[a, i] * x[3 + i]
+            for j in range(3):
+                spread += axes[a, i] * P[3 + i, 3 + j] * axes[a, j]
+        out["v_enu"][a] = v
+        out["v_std"][a] = sqrt(spread)
+        for b in range(a, 3):
+            total = 0.0
+            for i in range(3):
+                for j in range(3):
+                    total += axes[a, i] * P[i, j] * axes[b, j]
+            out["cov"][place] = total
+            place += 1
+    out["has_v"] = 1
+    for k in range(SYSTEMS):
+        known = s["known"][k] == 1
+        out["clock"][k] = x[_CLOCK + k] if known else _NAN
+        out["clock_std"][k] = sqrt(P[_CLOCK + k, _CLOCK + k]) if known else _NAN
+    out["drift"] = x[_DRIFT + reference]
+    out["drift_std"] = sqrt(P[_DRIFT + reference, _DRIFT + reference])
+
+
+@njit(cache=True)
+def prepare(s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array) -> bool:
+    """Bring the state to an epoch, anew after a gap; False where there is nothing to begin with."""
+    reference = first_known(s)
+    placed = epoch["placed"] == 1 and epoch["age"] == 0.0
+    if reference >= 0 and s["t"] >= 0:
+        clock, drift = s["x"][_CLOCK + reference], s["x"][_DRIFT + reference]
+        dt = (true_time(epoch["t"], clock) - s["t"]) * 1e-9
+        expected = clock + drift * dt
+        if placed and abs(epoch["clock"] - expected) > cfg["jump"]:
+            # The receiver set its clock: all systems' clocks move by as much.
+            step = epoch["clock"] - expected
+            _note(notes, counts, epoch, EVENT_CLOCK_JUMP, step)
+            for k in range(SYSTEMS):
+                s["x"][_CLOCK + k] += step
+                s["P"][_CLOCK + k, _CLOCK + k] += 1e4
+            expected = epoch["clock"]
+        now = true_time(epoch["t"], expected)
+        dt = (now - s["t"]) * 1e-9
+        if 0.0 < dt <= cfg["gap"] and s["rejected"] < cfg["rejections"]:
+            predict(s, cfg, dt)
+            s["t"] = now
+            return True
+        if placed:
+            _note(notes, counts, epoch, EVENT_RESET, dt)
+    if not placed:
+        return False
+    begin(s, epoch)
+    s["t"] = true_time(epoch["t"], epoch["clock"])
+    return True
+
+
+@njit(cache=True)
+def first_known(s: Record) -> int:
+    """The first system whose clock is known, or minus one."""
+    for k in range(SYSTEMS):
+        if s["known"][k] == 1:
+            return k
+    return -1
+
+
+@njit(cache=True)
+def _note(notes: Array, counts: Array, epoch: Record, kind: int, value: float) -> None:
+    row = notes[counts[2]]
+    row["t"] = epoch["t"]
+    row["log_t"] = epoch["log_t"]
+    row["kind"] = kind
+    row["satellite"] = -1
+    row["value"] = value
+    counts[2] += 1
+
+
+@njit(cache=True)
+def run_kinematic(
+    state: Array,
+    config: Array,
+    epochs: Array,
+    rows: Array,
+    scratch_solve: Array,
+    solutions: Array,
+    innovations: Array,
+    notes: Array,
+    counts: Array,
+) -> None:
+    """Carry the filter over the epochs of a block.
+
+    Parameters
+    ----------
+    state, config, scratch_solve : arrays of one record each
+        KINEMATIC_STATE_DTYPE, KINEMATIC_CONFIG_DTYPE, SOLVE_DTYPE.
+    epochs, rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
+    solutions : array of SINGLE_ROW_DTYPE
+        Room for one per epoch; `status` becomes the number of ranges used.
+    innovations : array of RESIDUAL_DTYPE
+        Room for two per row.
+    notes : array of NOTE_DTYPE
+        Room for two per epoch.
+    counts : int64 array (3,)
+        Filled: solutions, innovations, notes.
+    """
+    s, cfg, work = state[0], config[0], scratch_solve[0]
+    u, h = np.zeros(3), np.zeros(4)
+    index = np.zeros(4, dtype=np.int64)
+    scratch = np.zeros((3, STATES))
+    weight = np.zeros(SATELLITES)
+    for i in range(3):
+        counts[i] = 0
+    for e in range(epochs.shape[0]):
+        epoch = epochs[e]
+        part = rows[epoch["first"] : epoch["first"] + epoch["count"]]
+        if not prepare(s, cfg, epoch, notes, counts):
+            continue
+        used = update_epoch(s, cfg, epoch, part, weight, innovations, counts, u, h, index, scratch)
+        reference = first_known(s)
+        if reference >= 0:
+            out = solutions[counts[0]]
+            emit(s, epoch, reference, work["axes"], out)
+            out["status"] = used
+            dilutions(part, weight, s["x"][:3], work, u, out)
+            counts[0] += 1

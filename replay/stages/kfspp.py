@@ -1,0 +1,151 @@
+"""Filtered single-point positioning: a Kalman filter of constant velocity over the epochs.
+
+Position, velocity, and a clock with its drift for each system, from pseudoranges and
+Doppler (Tang et al. 2021, eqs 6 to 9). Where no range could be used the status is
+PREDICTED.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.configuration import Section
+from replay.gnss.measurements import Selection, gather_epochs, select_signals
+from replay.kernels import kinematic
+from replay.kernels.least_squares import SOLVE_DTYPE
+from replay.kernels.sights import NOTE_DTYPE
+from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.schemas import solution_pb2
+from replay.stages.base import (
+    Block,
+    Context,
+    Outputs,
+    Port,
+    StageSpec,
+    dump_arrays,
+    restore_arrays,
+)
+from replay.stages.gnss_columns import (
+    EVENT_TEXT,
+    antenna_solution_columns,
+    clock_columns,
+    event_columns,
+    geometry_columns,
+    residual_columns,
+)
+from replay.stages.spp import single_config
+from replay.stages.spp_config import KfsppConfig
+
+Array = np.ndarray[Any, Any]
+
+_TEXT: Final = {
+    **EVENT_TEXT,
+    kinematic.EVENT_CLOCK_JUMP: "the receiver set its clock by {value:.3f} m",
+    kinematic.EVENT_RESET: "the filter begins anew after {value:.3f} s",
+}
+
+
+@dataclasses.dataclass(slots=True)
+class KfsppState:
+    """Everything that crosses from one block to the next."""
+
+    selection: Selection
+    config: Array
+    kernel: Array
+    scratch: Array
+
+
+class FilteredSinglePoint:
+    """The stage `kfspp`."""
+
+    spec = StageSpec(
+        name="kfspp",
+        version=1,
+        inputs=(
+            Port(channels.GNSS_OBS),
+            Port(channels.SATELLITES),
+            Port(channels.CORRECTIONS),
+            Port(channels.COARSE),
+        ),
+        outputs=(
+            Port(channels.FILTER_INNOVATIONS),
+            Port(channels.FILTER_CLOCKS),
+            Port(channels.FILTER_GEOMETRY),
+            Port(channels.FILTER_EVENTS),
+            Port(channels.SOLUTION),
+        ),
+        trigger=Port(channels.GNSS_OBS),
+    )
+
+    def start(self, config: Section, context: Context) -> KfsppState:
+        """State before the first row."""
+        if not isinstance(config, KfsppConfig):
+            raise TypeError("kfspp takes a KfsppConfig")
+        own = config.kfspp
+        record = np.zeros(1, dtype=kinematic.KINEMATIC_CONFIG_DTYPE)
+        record["single"] = single_config(config.gnss, config.spp)
+        record["single"]["code_sigma"] = own.code_sigma
+        record["single"]["doppler_sigma"] = own.doppler_sigma
+        for name in ("velocity_noise", "clock_noise", "drift_noise", "gate", "gap", "jump"):
+            record[name] = getattr(own, name)
+        record["rejections"] = own.rejections
+        kernel = np.zeros(1, dtype=kinematic.KINEMATIC_STATE_DTYPE)
+        kernel["t"] = -1
+        return KfsppState(
+            selection=select_signals(config.gnss.signals, config.gnss.systems),
+            config=record,
+            kernel=kernel,
+            scratch=np.zeros(1, dtype=SOLVE_DTYPE),
+        )
+
+    def step(self, state: KfsppState, block: Block) -> tuple[KfsppState, Outputs]:
+        """Take a block of epochs."""
+        observations = block.get(channels.GNSS_OBS.name)
+        if observations is None:
+            return state, {}
+        found = gather_epochs(
+            observations,
+            state.selection,
+            block.get(channels.SATELLITES.name),
+            block.get(channels.CORRECTIONS.name),
+            block.get(channels.COARSE.name),
+        )
+        solutions = np.zeros(len(found.epochs), dtype=SINGLE_ROW_DTYPE)
+        innovations = np.zeros(2 * len(found.rows), dtype=RESIDUAL_DTYPE)
+        notes = np.zeros(2 * len(found.epochs), dtype=NOTE_DTYPE)
+        counts = np.zeros(3, dtype=np.int64)
+        kinematic.run_kinematic(
+            state.kernel, state.config, found.epochs, found.rows, state.scratch,
+            solutions, innovations, notes, counts,
+        )  # fmt: skip
+        solved = solutions[: counts[0]]
+        solved["status"] = np.where(
+            solved["status"] > 0,
+            solution_pb2.SOLUTION_STATUS_SINGLE,
+            solution_pb2.SOLUTION_STATUS_PREDICTED,
+        )
+        columns = {
+            channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[1]]),
+            channels.FILTER_CLOCKS: clock_columns(solved),
+            channels.FILTER_GEOMETRY: geometry_columns(solved),
+            channels.FILTER_EVENTS: event_columns(notes[: counts[2]], _TEXT),
+            channels.SOLUTION: antenna_solution_columns(solved),
+        }
+        return state, {channel.name: rows for channel, rows in columns.items() if len(rows)}
+
+    def finish(self, state: KfsppState) -> Outputs:
+        """Nothing is left to say."""
+        return {}
+
+    def dump(self, state: KfsppState) -> bytes:
+        """The state as bytes."""
+        return dump_arrays({"kernel": state.kernel})
+
+    def restore(self, state: KfsppState, data: bytes) -> KfsppState:
+        """The state of a dump."""
+        arrays = restore_arrays(data, {"kernel": kinematic.KINEMATIC_STATE_DTYPE})
+        return dataclasses.replace(state, kernel=arrays["kernel"])
