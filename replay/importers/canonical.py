@@ -19,18 +19,19 @@ def to_toml(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
         Names of the tables around this one.
     """
     lines = [
-        f"{_key(key)} = {literal(value)}"
+        f"{toml_key(key)} = {literal(value)}"
         for key, value in table.items()
         if not isinstance(value, Mapping)
     ]
     text = "".join(f"{line}\n" for line in lines)
     for key, value in table.items():
         if isinstance(value, Mapping):
-            inner = (*path, _key(key))
+            inner = (*path, toml_key(key))
             text += f"\n[{'.'.join(inner)}]\n{to_toml(value, inner)}"
     return text if path else text.lstrip("\n")
 
 
-def _key(key: str) -> str:
+def toml_key(key: str) -> str:
+    """A name as a key of TOML, quoted where it has to be."""
     bare = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
     return key if bare else literal(key)

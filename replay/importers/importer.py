@@ -9,21 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from replay import time
+from replay import channels, time
 from replay.engine.manifest import DEFAULTS, MANIFEST, make_manifest, manifest_metadata
-from replay.errors import ForeignFileError
+from replay.errors import ConfigurationError, ForeignFileError, SchemaError
 from replay.importers.canonical import to_toml
 from replay.importers.clock import text_columns, valid_times
 from replay.importers.delimited import read_csv
 from replay.importers.files import File, read_file
 from replay.importers.findings import Findings
+from replay.importers.matlab import read_mat
 from replay.importers.messages import Rows, build_rows
 from replay.importers.ordering import join_tables, order_rows
 from replay.importers.poll import repeats, steady_times
 from replay.importers.result import ImportResult, compare_digests
 from replay.importers.rtklib_pos import read_pos
 from replay.importers.rtklib_tag import Tag, read_tag
-from replay.importers.spec import CHANNEL_OF, Channel, Spec, load_spec
+from replay.importers.spec import Channel, Spec, load_spec
+from replay.importers.streams import Streams, check_formats
 from replay.importers.table import Int64, Mask, Table
 from replay.log.columns import Columns
 from replay.log.writer import LogWriter
@@ -68,6 +70,7 @@ def import_log(
         Where a file is missing or cannot be read as the spec says.
     """
     spec = load_spec(spec_path)
+    check_formats(spec)
     run = _Import(spec, data, Findings(strict=strict), progress or _silent)
     batch: dict[str, Columns] = {}
     topics: dict[str, str] = {}
@@ -75,6 +78,9 @@ def import_log(
         used = run.choose(name)
         batch[spec.channels[used].topic] = run.channel(used)
         topics[used] = spec.channels[used].topic
+    streams, named = run.streams(batch)
+    batch |= streams
+    topics |= named
     return run.write(out, batch, topics)
 
 
@@ -153,12 +159,41 @@ class _Import:
             present={field: mask[order] for field, mask in rows.present.items()},
         )
 
+    def streams(self, others: dict[str, Columns]) -> tuple[dict[str, Columns], dict[str, str]]:
+        """Rows of all streams by topic, and the topic of each of their names.
+
+        Raises
+        ------
+        ConfigurationError
+            Where a channel gives a stream's topic too.
+        """
+        streams = Streams(self.findings)
+        for name, stream in self.spec.streams.items():
+            for source in stream.sources:
+                file = self.spec.sources[source].file
+                self.progress(f"{name}: reading {file}")
+                form = self.spec.sources[source].format
+                count = streams.add(name, stream, form, self._file(file))
+                self.progress(f"{name}: {count} rows")
+        topics = streams.topics()
+        for name, topic in topics.items():
+            if topic in others:
+                raise ConfigurationError(
+                    f"{name.split()[0]} and a channel are both {topic}",
+                    where=str(self.spec.path),
+                    mend="give one another receiver",
+                )
+        return streams.join(others.values()), topics
+
     def write(self, out: Path, batch: dict[str, Columns], topics: dict[str, str]) -> ImportResult:
         """The log, with what it was made from."""
         self.progress(f"writing {out}")
         with LogWriter(out) as writer:
-            for used, topic in topics.items():
-                writer.add_channel(topic, CHANNEL_OF[self.spec.channels[used].kind].message)
+            for topic in topics.values():
+                kind = channels.find(topic)
+                if kind is None:
+                    raise SchemaError(f"{topic} is no channel", where=str(self.spec.path))
+                writer.add_channel(topic, kind.message)
             writer.write(batch)
             digests = writer.digests()
             notes = (*self.spec.notes, *self.findings.notes, *map(str, self.findings.losses.losses))
@@ -210,6 +245,8 @@ class _Import:
             file = self._file(source.file)
             if source.format == "rtklib-pos":
                 self.tables[key] = read_pos(file, self.findings)
+            elif source.format == "matlab":
+                self.tables[key] = read_mat(file, source.variable, source.columns)
             else:
                 self.tables[key] = read_csv(
                     file, source.columns, texts, self.findings, source.delimiter

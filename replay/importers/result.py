@@ -11,6 +11,7 @@ from typing import Final
 
 from replay.configuration import literal
 from replay.errors import ExitCode, LossReport
+from replay.importers.canonical import toml_key
 from replay.log.digest import ChannelDigest
 
 _EXPECT: Final = re.compile(r"(?ms)^\[expect\][^\n]*\n.*?(?=^\[|\Z)")
@@ -28,7 +29,8 @@ class ImportResult:
         Rows written.
     digests : mapping of topic to ChannelDigest
     topics : mapping of channel name to topic
-        Which channels of the spec were used.
+        Which channels of the spec were used; those of a stream are called after
+        the stream and the topic.
     losses : LossReport
         What was skipped, put in order or replaced.
     notes : tuple of str
@@ -79,7 +81,7 @@ def update_expected(spec_path: Path, result: ImportResult) -> None:
     expect: dict[str, str] = dict(tomllib.loads(text).get("expect", {}))
     for name, topic in result.topics.items():
         expect[name] = result.digests[topic].sha256
-    lines = "".join(f"{name} = {literal(expect[name])}\n" for name in sorted(expect))
+    lines = "".join(f"{toml_key(name)} = {literal(expect[name])}\n" for name in sorted(expect))
     table = f"[expect]\n{lines}"
     if _EXPECT.search(text):
         text = _EXPECT.sub(lambda _: table, text, count=1)

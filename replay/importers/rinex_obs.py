@@ -52,6 +52,8 @@ class RinexObservations:
         Of the receiver, NaN where absent.
     epoch_lines : int64 array (n,)
         From 1.
+    satellite_counts : int64 array (n,)
+        As each epoch's line states it.
     events : tuple of Event
     later_headers : tuple of ObservationHeader
         What events made of the header.
@@ -63,6 +65,7 @@ class RinexObservations:
     epoch_flags: Int64
     clock_offsets_s: Float64
     epoch_lines: Int64
+    satellite_counts: Int64
     events: tuple[Event, ...]
     later_headers: tuple[ObservationHeader, ...]
 
@@ -150,6 +153,7 @@ def read_rinex_obs(file: File, findings: Findings) -> RinexObservations:
         np.array(epochs.flags, dtype=np.int64),
         np.array(epochs.clock_offsets_s, dtype=np.float64),
         np.array(epochs.lines, dtype=np.int64),
+        np.array(epochs.satellite_counts, dtype=np.int64),
         tuple(epochs.events),
         tuple(epochs.headers[1:]),
     )

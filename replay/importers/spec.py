@@ -15,8 +15,12 @@ mounting = ["yaw -5.35 deg"]      # see replay.importers.mounting
 [channels.imu.time]               # see replay.importers.clock
 [channels.imu.fields]
 specific_force_body_m_s2 = { columns = ["ax", "-ay", "az"], unit = "g" }
+[streams.rover]                   # a file of several channels with times of its own
+source = "rover"                  # its format is one of replay.importers.streams
+receiver = "rover"
 [defaults.filter]                 # for the configuration of pipelines over the log
-[expect]                          # channel name -> digest
+[expect]                          # channel name, or stream name and topic -> digest
+"rover /gnss/rover/obs" = "…"
 ```
 """
 
@@ -61,10 +65,15 @@ CHANNEL_OF: Final[dict[str, ChannelSpec]] = {
 
 
 class Source(Section, frozen=True):
-    """A file: `columns` names the columns of one that has no header line."""
+    """A file: `columns` names the columns of one that has no header line.
+
+    A channel reads tables: `csv`, `rtklib-pos` and `matlab`, of which `variable`
+    names the matrix. A stream reads the formats of :mod:`replay.importers.streams`.
+    """
 
     file: str
-    format: Literal["csv", "rtklib-pos"] = "csv"
+    format: str = "csv"
+    variable: str = ""
     columns: tuple[str, ...] = ()
     delimiter: Annotated[str, msgspec.Meta(min_length=1, max_length=1)] = ","
 
@@ -177,12 +186,48 @@ class Channel(Section, frozen=True):
         return spec.at(receiver=self.receiver) if self.kind == "gnss_fix" else spec.topic
 
 
+class Stream(Section, frozen=True):
+    """A file that has times of its own and gives several channels.
+
+    `time_offset` is added to the times of a receiver whose stamps are off.
+    `available` says when a navigation message is known: from the `start` of the log,
+    as a program sees it that works on a finished recording, or from when it was
+    `transmitted`; left out, the format's own way. `position_ecef_m` stands in for the
+    approximate position that the file states.
+
+    Of receivers' binary formats: `approximate_time` is a GPS date near the start for
+    files that do not tell theirs; `lever_arm` goes with the receiver's own fixes, and
+    `truth` makes them the truth too; the scales are those of raw inertial samples.
+    """
+
+    source: str | tuple[str, ...]
+    receiver: str = "rover"
+    time_offset: Annotated[float, quantity("s", "times = times read + offset")] = 0.0
+    available: Literal["", "start", "transmitted"] = ""
+    position_ecef_m: tuple[Annotated[float, quantity("m", "ECEF, of the mark")], ...] = ()
+    approximate_time: str = ""
+    lever_arm: tuple[Annotated[float, quantity("m", "body, IMU to the antenna of fixes")], ...] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    truth: bool = False
+    gyro_scale: Annotated[float, quantity("rad", "of one count of raw inertial samples")] = 0.0
+    accel_scale: Annotated[float, quantity("m/s", "of one count of raw inertial samples")] = 0.0
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of its sources."""
+        return (self.source,) if isinstance(self.source, str) else self.source
+
+
 class _Head(Section, frozen=True):
     title: str
     origin: str
     licence: str
     sources: dict[str, dict[str, Any]]
-    channels: dict[str, dict[str, Any]]
+    channels: dict[str, dict[str, Any]] = msgspec.field(default_factory=dict)
+    streams: dict[str, dict[str, Any]] = msgspec.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     defaults: dict[str, dict[str, Any]] = msgspec.field(default_factory=dict)
     expect: dict[str, str] = msgspec.field(default_factory=dict)
@@ -200,10 +245,10 @@ class Spec:
         What the recording is, its public address, its licence.
     notes : tuple of str
         For a person; they go into the manifest.
-    sources, channels : mapping of name to Source, Channel
+    sources, channels, streams : mapping of name to Source, Channel, Stream
     defaults : mapping of section to table
         Stored in the log for the configuration of pipelines.
-    expect : mapping of channel name to str
+    expect : mapping of channel name, or stream name and topic, to str
         SHA-256 of the rows.
     table : mapping
         The spec as it was read.
@@ -216,6 +261,7 @@ class Spec:
     notes: tuple[str, ...]
     sources: dict[str, Source]
     channels: dict[str, Channel]
+    streams: dict[str, Stream]
     defaults: dict[str, dict[str, Any]]
     expect: dict[str, str]
     table: dict[str, Any]
@@ -257,6 +303,10 @@ def load_spec(path: Path) -> Spec:
             name: _section(Channel, part, f"{path}, [channels.{name}]")
             for name, part in head.channels.items()
         },
+        streams={
+            name: _section(Stream, part, f"{path}, [streams.{name}]")
+            for name, part in head.streams.items()
+        },
         defaults=head.defaults,
         expect=head.expect,
         table=table,
@@ -265,12 +315,16 @@ def load_spec(path: Path) -> Spec:
         _check(spec, name, channel)
         _check_fallback(spec, name)
     _check_topics(spec)
-    for name in spec.expect.keys() - spec.channels.keys():
-        raise ConfigurationError(
-            f"the spec expects a digest of {name!r}, which is no channel",
-            where=f"{path}, [expect]",
-            mend=f"known: {', '.join(spec.channels)}",
-        )
+    for name, stream in spec.streams.items():
+        _check_stream(spec, name, stream)
+    for name in spec.expect:
+        if name not in spec.channels and name.partition(" ")[0] not in spec.streams:
+            known = [*spec.channels, *(f"{stream} TOPIC" for stream in spec.streams)]
+            raise ConfigurationError(
+                f"the spec expects a digest of {name!r}, which is no channel",
+                where=f"{path}, [expect]",
+                mend=f"known: {', '.join(known)}",
+            )
     return spec
 
 
@@ -289,10 +343,7 @@ def _section(cls: type[SectionT], table: dict[str, Any], where: str) -> SectionT
 
 def _check(spec: Spec, name: str, channel: Channel) -> None:
     where = f"{spec.path}, [channels.{name}]"
-    for source in (channel.source, *channel.join):
-        if source not in spec.sources:
-            known = ", ".join(spec.sources)
-            raise ConfigurationError(f"no source {source!r}", where=where, mend=f"known: {known}")
+    _check_sources(spec, (channel.source, *channel.join), where)
     if len(channel.lever_arm) != 3:
         raise ConfigurationError(
             f"lever_arm has {len(channel.lever_arm)} numbers", where=where, mend="write three"
@@ -304,6 +355,31 @@ def _check(spec: Spec, name: str, channel: Channel) -> None:
                 where=where,
                 mend=f"its fields are {', '.join(sorted(FIELDS_OF[channel.kind]))}",
             )
+
+
+def _check_sources(spec: Spec, names: tuple[str, ...], where: str) -> None:
+    for source in names:
+        if source not in spec.sources:
+            known = ", ".join(spec.sources)
+            raise ConfigurationError(f"no source {source!r}", where=where, mend=f"known: {known}")
+
+
+def _check_stream(spec: Spec, name: str, stream: Stream) -> None:
+    where = f"{spec.path}, [streams.{name}]"
+    _check_sources(spec, stream.sources, where)
+    if name in spec.channels or not name or " " in name:
+        raise ConfigurationError(
+            f"a stream cannot be called {name!r}",
+            where=where,
+            mend="take a name without blanks that no channel has",
+        )
+    if not stream.sources:
+        raise ConfigurationError("the stream has no source", where=where, mend="name one")
+    if len(stream.position_ecef_m) not in (0, 3):
+        count = len(stream.position_ecef_m)
+        raise ConfigurationError(
+            f"position_ecef_m has {count} numbers", where=where, mend="write three"
+        )
 
 
 def _check_fallback(spec: Spec, name: str) -> None:

@@ -1,0 +1,211 @@
+"""Streams: files that have times of their own and give several channels at once.
+
+To add a format, write a function that takes a file's bytes, the findings and the
+spec's table and gives columns by topic, each in the order of its log times, and name
+it in :data:`FORMATS`. Rows of several files are joined here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final, Literal
+
+import numpy as np
+
+from replay import channels, time
+from replay.errors import ConfigurationError, ForeignFileError
+from replay.importers import receiver_streams
+from replay.importers.corrected_ranges import corrected_ranges_stream
+from replay.importers.files import File
+from replay.importers.findings import Findings
+from replay.importers.rinex_streams import UNKNOWN_NS, rinex_nav_stream, rinex_obs_stream
+from replay.importers.spec import Spec, Stream
+from replay.log.codec import codec_for
+from replay.log.columns import Columns, Int64, concatenate
+
+Reader = Callable[[File, Findings, Stream], Mapping[str, Columns]]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Format:
+    """A kind of file.
+
+    Attributes
+    ----------
+    read : function
+        File, findings and stream to columns by topic. A time of -1 is unknown.
+    available : str
+        When a navigation message is known where the spec does not say.
+    """
+
+    read: Reader
+    available: Literal["start", "transmitted"] = "transmitted"
+
+
+FORMATS: Final[dict[str, Format]] = {
+    "rinex-obs": Format(rinex_obs_stream),
+    "rinex-nav": Format(rinex_nav_stream, available="start"),
+    "corrected-ranges-mat": Format(corrected_ranges_stream),
+    "ubx": Format(receiver_streams.ubx_stream),
+    "rtcm3": Format(receiver_streams.rtcm_stream),
+    "sbf": Format(receiver_streams.sbf_stream),
+    "novatel": Format(receiver_streams.novatel_stream),
+    "nmea": Format(receiver_streams.nmea_stream),
+}
+TABLE_FORMATS: Final = ("csv", "rtklib-pos", "matlab")
+_NAVIGATION: Final = (channels.NAV.topic, channels.NAV_IONOSPHERE.topic, channels.NAV_TIME.topic)
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Rows of one topic of one file."""
+
+    stream: str
+    columns: Columns
+
+
+def check_formats(spec: Spec) -> None:
+    """Whether every source is of a format that its channels and streams can read.
+
+    Raises
+    ------
+    ConfigurationError
+        Where one is not.
+    """
+    for users, known, what in (
+        ({n: (c.source, *c.join) for n, c in spec.channels.items()}, TABLE_FORMATS, "channels"),
+        ({n: s.sources for n, s in spec.streams.items()}, tuple(FORMATS), "streams"),
+    ):
+        for name, sources in users.items():
+            for source in sources:
+                if spec.sources[source].format not in known:
+                    raise ConfigurationError(
+                        f"source {source} is of format {spec.sources[source].format!r}",
+                        where=f"{spec.path}, [{what}.{name}]",
+                        mend=f"{what} read {', '.join(known)}",
+                    )
+
+
+class Streams:
+    """Rows of all streams of a spec, topic by topic.
+
+    Parameters
+    ----------
+    findings : Findings
+    """
+
+    def __init__(self, findings: Findings) -> None:
+        self._findings = findings
+        self._parts: dict[str, list[_Part]] = {}
+
+    def add(self, name: str, stream: Stream, form: str, file: File) -> int:
+        """Read a file of a stream; gives the number of its rows.
+
+        Raises
+        ------
+        ConfigurationError
+            Where another stream gives the same channel of a receiver.
+        ForeignFileError
+            Where the file gives nothing, or cannot be read.
+        """
+        count = 0
+        available = stream.available or FORMATS[form].available
+        for topic, columns in FORMATS[form].read(file, self._findings, stream).items():
+            parts = self._parts.setdefault(topic, [])
+            if topic not in _NAVIGATION and any(part.stream != name for part in parts):
+                raise ConfigurationError(
+                    f"streams {parts[0].stream} and {name} are both {topic}",
+                    where=file.name,
+                    mend="give one another receiver",
+                )
+            columns = _shift(columns, round(stream.time_offset * time.NS_PER_S))
+            if topic in _NAVIGATION and available == "start":
+                unknown = np.full(len(columns), UNKNOWN_NS, dtype=np.int64)
+                columns = dataclasses.replace(columns, log_time_ns=unknown)
+            parts.append(_Part(name, columns))
+            count += len(columns)
+        if not count:
+            raise ForeignFileError(
+                "the file gives no rows",
+                where=file.name,
+                mend="; ".join(str(loss) for loss in self._findings.losses.losses),
+            )
+        if stream.time_offset:
+            text = f"{file.name}: {stream.time_offset!r} s were added to the times that were read"
+            self._findings.notes.append(text)
+        return count
+
+    def topics(self) -> dict[str, str]:
+        """Topic of each name, which is that of the stream and the topic."""
+        return {f"{parts[0].stream} {topic}": topic for topic, parts in self._parts.items()}
+
+    def join(self, others: Iterable[Columns]) -> dict[str, Columns]:
+        """Rows by topic, in the order of their log times.
+
+        Parameters
+        ----------
+        others : iterable of Columns
+            What else the log holds: it starts with the first row that is no navigation
+            message.
+        """
+        known = [columns.log_time_ns for columns in others]
+        for topic, parts in self._parts.items():
+            if topic not in _NAVIGATION:
+                known += [part.columns.log_time_ns for part in parts]
+        start = _first(known)
+        if start == UNKNOWN_NS:
+            every = [part.columns for parts in self._parts.values() for part in parts]
+            start = _first([columns.valid_time_ns for columns in every])
+        return {topic: self._join(topic, parts, start) for topic, parts in self._parts.items()}
+
+    def _join(self, topic: str, parts: list[_Part], start: int) -> Columns:
+        columns = concatenate([part.columns for part in parts])
+        log = np.where(columns.log_time_ns < 0, start, columns.log_time_ns)
+        valid = np.where(columns.valid_time_ns < 0, start, columns.valid_time_ns)
+        columns = dataclasses.replace(columns, log_time_ns=log, valid_time_ns=valid)
+        order = np.lexsort((valid, log)).astype(np.int64)
+        if (np.diff(order) != 1).any():
+            columns = columns.take(order)
+        if topic in _NAVIGATION or len(parts) > 1:
+            columns = columns.take(self._distinct(topic, columns))
+        sequence = np.arange(len(columns), dtype=np.uint32)
+        return dataclasses.replace(columns, sequence=sequence)
+
+    def _distinct(self, topic: str, columns: Columns) -> Int64:
+        """Rows without those that repeat an earlier one in valid time and every byte."""
+        spec = channels.find(topic)
+        payloads = codec_for(spec.message if spec else "").encode(columns)
+        seen: set[tuple[int, bytes]] = set()
+        rows = []
+        for row, blob in enumerate(payloads.blobs()):
+            key = (int(columns.valid_time_ns[row]), hashlib.sha256(blob).digest())
+            if key not in seen:
+                seen.add(key)
+                rows.append(row)
+        again = len(columns) - len(rows)
+        if again:
+            text = (
+                f"{topic}: {again} of {len(columns)} rows repeat another exactly and are left out"
+            )
+            self._findings.notes.append(text)
+        return np.array(rows, dtype=np.int64)
+
+
+def _shift(columns: Columns, by_ns: int) -> Columns:
+    """Rows with all known times moved."""
+    if not by_ns:
+        return columns
+    log, valid = columns.log_time_ns, columns.valid_time_ns
+    return dataclasses.replace(
+        columns,
+        log_time_ns=np.where(log < 0, log, log + by_ns),
+        valid_time_ns=np.where(valid < 0, valid, valid + by_ns),
+    )
+
+
+def _first(times: Iterable[Int64]) -> int:
+    """Earliest known time, or UNKNOWN_NS."""
+    firsts = [int(known.min()) for part in times if len(known := part[part >= 0])]
+    return min(firsts, default=UNKNOWN_NS)
