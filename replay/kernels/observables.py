@@ -3,7 +3,8 @@
 The satellite is that of a broadcast record, at the moment when what arrives was sent;
 the range is the light-time solution with the Earth's rotation, and the rates are the
 exact derivatives of the same formulas. Rates of the atmosphere are central differences
-over a second.
+over a second. The atmosphere's delays are added to the range; that the signal left so
+much earlier (0.1 us at most) would move the satellite by less than 0.1 mm of range.
 """
 
 import math
@@ -156,7 +157,7 @@ def delays(
     time_ns, offset_s : int, ns and float, s
         Time of reception.
     since_s : float, s
-        The same since the nodes' beginning.
+        The same since the third node.
     x, y, z : float, m
         Receiver, ECEF.
     state : float64 array (8,)
@@ -176,7 +177,7 @@ def delays(
             of_week,
         )  # fmt: skip
         _, _, slant = beidou_pierce_point(latitude, longitude, elevation, azimuth)
-        at = since_s / atmosphere["ionosphere_spacing"]
+        at = 1.0 + since_s / atmosphere["ionosphere_spacing"]
         o = atmosphere["origin"]
         east, north, _ = rotate3(atmosphere["axes"], x - o[0], y - o[1], z - o[2])
         vertical = cubic(residuals[0], at) + _KM * (
@@ -186,7 +187,7 @@ def delays(
     neutral = 0.0
     if atmosphere["troposphere"] != 0:
         hydrostatic, zenith_wet = zenith_standard(latitude, height, atmosphere["humidity"])
-        zenith_wet += cubic(wet, since_s / atmosphere["wet_spacing"])
+        zenith_wet += cubic(wet, 1.0 + since_s / atmosphere["wet_spacing"])
         neutral = hydrostatic * niell_hydrostatic(
             elevation, latitude, height, day_of_year(time_ns)
         ) + zenith_wet * niell_wet(elevation, latitude)
@@ -222,7 +223,7 @@ def see(
     times_ns, offsets_s : int64 and float64 arrays (e,)
         True times of reception, GPS.
     start_ns : int, ns
-        When the nodes begin.
+        Time of the third node.
     positions, velocities : float64 arrays (e, 3), m and m/s, ECEF
         Of the antenna at those times.
     mask_rad, sine_of_mask : float
@@ -260,9 +261,7 @@ def see(
         out["elevation"] = elevation
         out["azimuth"] = azimuth
         since = (time_ns - start_ns) / 1e9 + offset
-        iono, neutral = delays(
-            air, residuals, wet, time_ns, offset, since, x, y, z, state, axes
-        )
+        iono, neutral = delays(air, residuals, wet, time_ns, offset, since, x, y, z, state, axes)
         out["ionosphere_m"] = iono
         out["neutral_m"] = neutral
         iono_change = 0.0

@@ -1,6 +1,9 @@
 """What a simulated receiver makes of one signal: obstruction, lock, noise, slips.
 
 From the true sights of :mod:`replay.kernels.observables` and prepared random numbers.
+A carrier phase refers to the clock that the message is for, without group delays and
+with whole cycles only, so that double differences of phases are whole numbers but for
+geometry, atmosphere and noise; group delays and receiver biases are in the code alone.
 """
 
 from typing import Final
@@ -191,6 +194,7 @@ def track(
     c = SPEED_OF_LIGHT_M_S
     waiting = 0
     locked = False
+    ever = False
     ambiguity = 0
     begun = 0
     for k in range(sights.shape[0]):
@@ -243,7 +247,8 @@ def track(
             locked = True
             begun = k
             ambiguity = int(u[AMBIGUITY] * _LARGEST_AMBIGUITY) - int(0.5 * _LARGEST_AMBIGUITY)
-            m["flag"] = 1 if k > 0 else 0
+            m["flag"] = 1 if ever else 0
+            ever = True
         else:
             slip = listed[k]
             if u[SLIP] < s["slip_probability"]:

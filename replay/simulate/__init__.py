@@ -1,4 +1,4 @@
-"""Simulated drives: trajectory, inertial unit, receiver and truth, into a log."""
+"""Simulated drives: trajectory, inertial unit, satellites, receivers and truth, into a log."""
 
 from replay.simulate.scenario import Scenario, load_scenario, read_scenario
 from replay.simulate.write import SimulationResult, make_channels, simulate, write_log

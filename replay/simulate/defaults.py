@@ -8,10 +8,11 @@ what follows from the scenario is said; the rest is left to the pipeline.
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
-from replay.configuration import STANDARD_GRAVITY_M_S2, Table, literal
-from replay.simulate.scenario import Settings
+from replay.configuration import STANDARD_GRAVITY_M_S2, Table, merge
+from replay.simulate.scenario import Settings, tables_toml
 
 # What is left to a perfect unit: a filter needs some noise, and integration has its own.
 _LEAST_GYRO_NOISE: Final = 1e-7  # rad/sqrt(s)
@@ -99,13 +100,11 @@ def fitting_defaults(settings: Settings) -> Table:
     }
 
 
-def defaults_toml(settings: Settings) -> str:
-    """Canonical TOML of :func:`fitting_defaults`."""
-    sections = []
-    for name, table in fitting_defaults(settings).items():
-        lines = [f"{key} = {literal(value)}" for key, value in table.items()]
-        sections.append("\n".join([f"[{name}]", *lines]) + "\n")
-    return "\n".join(sections)
+def defaults_toml(settings: Settings, over: Mapping[str, Any] | None = None) -> str:
+    """Canonical TOML of :func:`fitting_defaults`, with tables that go over it."""
+    tables = fitting_defaults(settings)
+    merge(tables, over or {})
+    return tables_toml(tables)
 
 
 def _three(value: float) -> tuple[float, float, float]:

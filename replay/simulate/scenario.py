@@ -15,6 +15,7 @@ from replay.configuration import Section, Table, build, literal, merge, quantity
 from replay.errors import ConfigurationError, UsageError
 from replay.simulate import gnss, imu
 from replay.simulate.segments import Segment, read_segments
+from replay.simulate.sky import Setup, take_setup
 
 _LARGEST_LATITUDE_RAD: Final = 1.55  # local axes turn too fast closer to a pole
 _LOWEST_IMU_RATE_HZ: Final = 10.0  # below, the integration of the motion is not exact enough
@@ -49,6 +50,7 @@ class Gnss(Section, frozen=True):
     """The receiver; `errors` go over those of the grade."""
 
     receiver: str = "rover"
+    fixes: bool = True  # False leaves the channel out
     rate: Annotated[float, quantity("Hz", "of fixes")] = 4.0
     grade: str = "rtk"
     velocity: bool = True
@@ -86,10 +88,16 @@ class Scenario:
     ----------
     settings : Settings
     segments : tuple of Segment
+    setup : Setup
+        Satellites and receivers that observe them.
+    defaults : Table
+        Sections of pipelines' configurations that go over those that fit the sensors.
     """
 
     settings: Settings
     segments: tuple[Segment, ...]
+    setup: Setup = dataclasses.field(default_factory=Setup)
+    defaults: Table = dataclasses.field(default_factory=dict)
 
     def to_toml(self) -> str:
         """Canonical TOML; reading it gives an equal scenario."""
@@ -97,7 +105,19 @@ class Scenario:
         for segment in self.segments:
             keys = (f"{k} = {literal(getattr(segment, k))}" for k in segment.__struct_fields__)
             parts.append("\n".join(("[[segments]]", *keys)) + "\n")
+        if self.setup.receivers:
+            parts.append(self.setup.to_toml())
+        if self.defaults:
+            parts.append(tables_toml({"defaults": self.defaults}))
         return "\n".join(parts)
+
+
+def tables_toml(tables: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
+    """TOML of tables in tables."""
+    lines = [f"{k} = {literal(v)}" for k, v in tables.items() if not isinstance(v, Mapping)]
+    text = "\n".join([f"[{'.'.join(path)}]", *lines]) + "\n" if path and lines else ""
+    inner = [tables_toml(v, (*path, k)) for k, v in tables.items() if isinstance(v, Mapping)]
+    return "\n".join(part for part in (text, *inner) if part)
 
 
 def load_scenario(path: Path, tables: Iterable[Mapping[str, Any]] = ()) -> Scenario:
@@ -142,11 +162,15 @@ def read_scenario(table: Mapping[str, Any]) -> Scenario:
     rest: Table = {}
     merge(rest, table)
     segments = read_segments(rest.pop("segments", None))
+    setup = take_setup(rest)
+    defaults = rest.pop("defaults", {})
+    if not isinstance(defaults, dict):
+        raise ConfigurationError("defaults is no table", mend="write [defaults.SECTION]")
     _apply_grade(rest, "imu", Imu().grade, imu.IMU_GRADES)
     _apply_grade(rest, "gnss", Gnss().grade, gnss.GNSS_GRADES)
     settings = build(Settings, [rest])
     _check(settings)
-    return Scenario(settings, segments)
+    return Scenario(settings, segments, setup, defaults)
 
 
 def _apply_grade(

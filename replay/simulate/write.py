@@ -20,8 +20,10 @@ from replay.log.writer import LogWriter
 from replay.schemas import gnss_pb2
 from replay.simulate import gnss, imu
 from replay.simulate.defaults import defaults_toml
+from replay.simulate.observations import SIMULATED, observe
 from replay.simulate.scenario import Scenario, Settings, load_scenario
 from replay.simulate.trajectory import Trajectory, ecef_of, plan
+from replay.simulate.truth import Scene
 
 Times = npt.NDArray[np.int64]
 
@@ -72,13 +74,15 @@ def simulate(
 
 def write_log(scenario: Scenario, out: Path) -> SimulationResult:
     """Write the log of a scenario that was read."""
-    rows = make_channels(scenario)
+    rows, told = make_all(scenario)
     toml = scenario.to_toml()
-    messages = {spec.topic: spec.message for spec in (channels.IMU, channels.TRUTH)}
     with LogWriter(out) as writer:
         for topic in rows:
-            writer.add_channel(topic, messages.get(topic, channels.GNSS_FIX.message))
-        writer.add_metadata(DEFAULTS, {"toml": defaults_toml(scenario.settings)})
+            writer.add_channel(topic, _message(topic))
+        defaults = defaults_toml(scenario.settings, scenario.defaults)
+        writer.add_metadata(DEFAULTS, {"toml": defaults})
+        if told:
+            writer.add_metadata(SIMULATED, told)
         for batch in _batches(rows):
             writer.write(batch)
         digests = writer.digests()
@@ -94,8 +98,23 @@ def write_log(scenario: Scenario, out: Path) -> SimulationResult:
     return SimulationResult(out, (last - first) / time.NS_PER_S, digests)
 
 
+def _message(topic: str) -> str:
+    spec = channels.find(topic)
+    if spec is None:
+        raise KeyError(topic)
+    return spec.message
+
+
 def make_channels(scenario: Scenario) -> dict[str, Columns]:
-    """Rows of every channel of a scenario, by topic.
+    """Rows of every channel of a scenario, by topic; errors as of :func:`make_all`."""
+    return make_all(scenario)[0]
+
+
+def make_all(scenario: Scenario) -> tuple[dict[str, Columns], dict[str, str]]:
+    """Rows of every channel of a scenario, by topic, and what observations hide.
+
+    The second is the metadata record `replay.simulated`: JSON texts of cycle slips and
+    of the whole cycles in carrier phases; empty without observations.
 
     Raises
     ------
@@ -126,16 +145,22 @@ def make_channels(scenario: Scenario) -> dict[str, Columns]:
     )
     elapsed_ns = np.arange(1, samples + 1, dtype=np.int64) * period_ns
     end_ns = int(elapsed_ns[-1])
-    return {
+    rows = {
         channels.IMU.topic: Columns.build(
             start_ns + elapsed_ns,
             {"angular_rate_body_rad_s": data.rates, "specific_force_body_m_s2": data.forces},
-        ),
-        channels.GNSS_FIX.at(receiver=settings.gnss.receiver): _fixes(
-            settings, trajectory, start_ns, end_ns
-        ),
-        channels.TRUTH.topic: _truth(settings, trajectory, data, start_ns, end_ns),
+        )
     }
+    if settings.gnss.fixes:
+        fixes = _fixes(settings, trajectory, start_ns, end_ns)
+        rows[channels.GNSS_FIX.at(receiver=settings.gnss.receiver)] = fixes
+    told: dict[str, str] = {}
+    if scenario.setup.receivers:
+        scene = Scene(trajectory, origin, start_ns, end_ns, settings.seed)
+        observed, told = observe(scenario.setup, scene)
+        rows.update(observed)
+    rows[channels.TRUTH.topic] = _truth(settings, trajectory, data, start_ns, end_ns)
+    return rows, told
 
 
 def _fixes(settings: Settings, trajectory: Trajectory, start_ns: int, end_ns: int) -> Columns:

@@ -1,0 +1,369 @@
+"""Observations of simulated receivers: what each saw, measured and lost, as rows of the log."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from replay import channels, time
+from replay.errors import ConfigurationError
+from replay.gnss.signals import frequency_hz
+from replay.kernels import elementary, tracking
+from replay.kernels.atmosphere import KLOBUCHAR_REFERENCE_HZ
+from replay.kernels.noise import gauss_markov
+from replay.kernels.observables import SIGHT_DTYPE, see
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, group_delay
+from replay.kernels.tracking import MEASUREMENT_DTYPE, SIGNAL_DTYPE
+from replay.log.columns import Columns, Ragged, concatenate
+from replay.schemas import navigation_pb2
+from replay.simulate.blockage import Surroundings, surroundings
+from replay.simulate.constellation import messages, name_of, sends
+from replay.simulate.noise import Floats, normals, uniforms
+from replay.simulate.sky import Receiver, Setup
+from replay.simulate.truth import Epochs, Scene, TrueSky, make_epochs, make_sky, wander
+
+SIMULATED: Final = "replay.simulated"
+
+Records = npt.NDArray[np.void]
+Ints = npt.NDArray[np.int64]
+
+_MILLISECOND: Final = 1e-3
+_HIDDEN_DELAY_M: Final = 1.0  # of signals whose delay no message tells; assumed
+_NODES_PER_TAU: Final = 10.0
+_HOUR_S: Final = 3600.0
+
+
+def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, str]]:
+    """Channels of navigation data and of every receiver, and what was done to them.
+
+    Returns
+    -------
+    rows : dict of topic to Columns
+    metadata : dict of str to str
+        JSON texts: `slips` and `arcs`, the whole cycles in each stretch of carrier phase.
+    """
+    sky = make_sky(setup, scene)
+    rows = {
+        channels.NAV.topic: messages(sky.broadcast, scene.start_ns, scene.start_ns + scene.end_ns),
+        channels.NAV_IONOSPHERE.topic: _ionosphere(setup, scene.start_ns),
+    }
+    slips: list[dict[str, Any]] = []
+    arcs: list[list[Any]] = []
+    for receiver in setup.receivers:
+        epochs = make_epochs(receiver, scene)
+        around = [s for s in setup.blockages if _concerns(s.receivers, receiver)]
+        part = _Part(setup, scene, sky, receiver, epochs, around)
+        measured = part.measure()
+        at = {"receiver": receiver.name}
+        rows[channels.RECEIVER.at(**at)] = _information(receiver, epochs, scene)
+        rows[channels.RECEIVER_EPOCH.at(**at)] = part.epoch_rows(measured)
+        rows[channels.GNSS_OBS.at(**at)] = measured
+        slips += part.slips
+        arcs += part.arcs
+        _check_slips(setup, receiver, epochs, part.slips, scene.start_ns)
+    return rows, {"slips": json.dumps(slips), "arcs": json.dumps(arcs, separators=(",", ":"))}
+
+
+def _check_slips(
+    setup: Setup, receiver: Receiver, epochs: Epochs, made: list[dict[str, Any]], start_ns: int
+) -> None:
+    """Refuse a listed slip that found no carrier phase to break."""
+    for slip in setup.slips:
+        if slip.receiver != receiver.name:
+            continue
+        row = np.searchsorted(epochs.elapsed_ns, round(slip.time * time.NS_PER_S))
+        at = epochs.elapsed_ns[row] + start_ns if row < len(epochs.elapsed_ns) else -1
+        if not any(
+            one["satellite"] == slip.satellite
+            and one["time_ns"] == at
+            and slip.signal in ("", one["signal"])
+            for one in made
+        ):
+            raise ConfigurationError(
+                f"no carrier phase of {slip.satellite} {slip.signal} goes on at {slip.time:g} s",
+                where=f"slips of {receiver.name}",
+                mend="choose a satellite that is tracked then",
+            )
+
+
+def _concerns(names: tuple[str, ...], receiver: Receiver) -> bool:
+    return receiver.name in names or (not names and receiver.kind == "vehicle")
+
+
+class _Part:
+    """One receiver's share."""
+
+    def __init__(
+        self, setup: Setup, scene: Scene, sky: TrueSky, receiver: Receiver, epochs: Epochs,
+        around: list[Any],
+    ) -> None:  # fmt: skip
+        self.setup, self.scene, self.sky = setup, scene, sky
+        self.receiver, self.epochs = receiver, epochs
+        self.around = around
+        self.slips: list[dict[str, Any]] = []
+        self.arcs: list[list[Any]] = []
+        spans = np.zeros(len(epochs.elapsed_ns), dtype=np.bool_)
+        for begin_s, end_s in receiver.gaps:
+            spans |= (epochs.elapsed_ns >= round(begin_s * time.NS_PER_S)) & (
+                epochs.elapsed_ns < round(end_s * time.NS_PER_S)
+            )
+        self.awake = ~spans
+        self.biases = {
+            signal: receiver.noise.code_bias
+            * float(normals(scene.seed, f"{receiver.name}.{signal}.bias", 1, 1)[0, 0])
+            for signal in receiver.signals
+        }
+
+    def measure(self) -> Columns:
+        """Rows of all satellites and signals, sorted by time, satellite, signal."""
+        sights = self._sights()
+        around = surroundings(
+            self.around, self.receiver.name, self.scene.seed, self.epochs.elapsed_ns,
+            self.epochs.headings, sights,
+        )  # fmt: skip
+        parts, order = [], []
+        for index, name in enumerate(sorted(sights)):
+            number = next(n for n, r in enumerate(self.sky.satellites) if name_of(r) == name)
+            for signal in sorted(self.receiver.signals):
+                if signal[0] == name[0] and sends(self.sky.satellites[number], signal[1:]):
+                    table = self._signal(number, signal, sights[name], around[name])
+                    rows = np.flatnonzero(table["code"])
+                    parts.append(self._columns(name, signal[1:], table, rows))
+                    order.append(rows * len(sights) + index)
+        if not parts:
+            raise ConfigurationError(
+                "no satellite sends any of its signals", where=self.receiver.name,
+                mend="see sky.systems, signals and mask",
+            )  # fmt: skip
+        # Parts come by satellite and signal: a stable sort by epoch and satellite keeps both.
+        rows = np.argsort(np.concatenate(order), kind="stable")
+        return _renumbered(concatenate(parts).take(rows))
+
+    def _sights(self) -> dict[str, Records]:
+        """True sights of the satellites that are above the mask at some epoch."""
+        scene, epochs, sky = self.scene, self.epochs, self.sky
+        tropo = self.setup.sky.troposphere
+        span_s = scene.end_ns / time.NS_PER_S
+        source = f"{self.receiver.name}.troposphere"
+        own = wander(scene.seed, source, tropo.tau, span_s, 1)[0]
+        wet = sky.common_wet + tropo.local_wet * own
+        times = scene.start_ns + epochs.elapsed_ns
+        offsets = -epochs.clock[:, 0]
+        sine = float(elementary.sin(self.receiver.mask))
+        systems = {signal[0] for signal in self.receiver.signals}
+        found = {}
+        for index, record in enumerate(sky.satellites):
+            name = name_of(record)
+            if name[0] not in systems:
+                continue
+            sights = np.zeros(len(times), dtype=SIGHT_DTYPE)
+            see(
+                sky.satellites[index : index + 1], sky.atmosphere, sky.residuals[index], wet,
+                times, offsets, scene.start_ns, epochs.positions, epochs.velocities,
+                self.receiver.mask, sine, sights,
+            )  # fmt: skip
+            if sights["seen"].any():
+                found[name] = sights
+        return found
+
+    def _signal(self, number: int, signal: str, sights: Records, around: Surroundings) -> Records:
+        """Measurements of one signal of one satellite at every epoch."""
+        receiver, scene = self.receiver, self.scene
+        record = self.sky.satellites[number]
+        name, count = name_of(record), len(sights)
+        source = f"{receiver.name}.{name}.{signal[1:]}"
+        noise = normals(scene.seed, source, count, 6)
+        self._correlate(noise)
+        draws = uniforms(scene.seed, f"{source}.slips", 4 * count).reshape(count, 4)
+        listed = np.zeros(count, dtype=np.int64)
+        for slip in self.setup.slips:
+            if (slip.receiver, slip.satellite) == (receiver.name, name) and (
+                slip.signal in ("", signal[1:])
+            ):
+                at = np.searchsorted(self.epochs.elapsed_ns, round(slip.time * time.NS_PER_S))
+                if at < count:
+                    listed[at] += slip.cycles
+        states = np.where(self.awake, around.states, tracking.BLOCKED)
+        out = np.zeros(count, dtype=MEASUREMENT_DTYPE)
+        tracking.track(
+            sights, states, around.losses, self.epochs.clock, self._settings(number, signal),
+            noise, draws, listed, self.epochs.interval_s, out,
+        )  # fmt: skip
+        self._remember(name, signal[1:], out)
+        return out
+
+    def _correlate(self, noise: Floats) -> None:
+        """Turn the columns of multipath into correlated ones."""
+        settings = self.receiver.multipath
+        columns = noise[:, tracking.CODE_MULTIPATH : tracking.CARRIER_MULTIPATH + 1]
+        interval = self.epochs.interval_s
+        if settings.filter == "butterworth":
+            pole = butterworth_pole(settings.cutoff, interval)
+            gain = math.sqrt(0.5 * (1.0 - pole))
+            for column in range(columns.shape[1]):
+                tracking.low_pass(pole, gain, columns[:, column])
+            return
+        decay = float(elementary.exp(-interval / settings.tau))
+        drive = math.sqrt(-float(elementary.expm1(-2.0 * interval / settings.tau)))
+        gauss_markov(1.0, decay, drive, columns)
+
+    def _settings(self, number: int, signal: str) -> Records:
+        """Numbers of one signal for the kernel."""
+        r, record = self.receiver, self.sky.satellites[number]
+        band = int(signal[1])
+        frequency = frequency_hz(signal[0], band)
+        ratio = KLOBUCHAR_REFERENCE_HZ / frequency
+        told = float(group_delay(self.sky.broadcast[number], band))
+        if math.isnan(told):
+            source = f"delay.{name_of(record)}.{band}"
+            hidden = float(normals(self.scene.seed, source, 1, 1)[0, 0])
+            told = _HIDDEN_DELAY_M / SPEED_OF_LIGHT_M_S * hidden
+        one = np.zeros(1, dtype=SIGNAL_DTYPE)
+        values = {
+            "wavelength_m": SPEED_OF_LIGHT_M_S / frequency,
+            "ionosphere": ratio * ratio,
+            "code_delay_m": SPEED_OF_LIGHT_M_S * told + self.biases[signal],
+            "zenith_dbhz": r.strength.zenith,
+            "drop_db": r.strength.drop,
+            "cn0_sigma_db": r.strength.sigma,
+            "code_threshold_dbhz": r.strength.code_threshold,
+            "carrier_threshold_dbhz": r.strength.carrier_threshold,
+            "code_sigma_m": r.noise.code,
+            "carrier_sigma_m": r.noise.carrier,
+            "rate_sigma_m_s": r.noise.rate,
+            "code_multipath_m": r.multipath.code,
+            "carrier_multipath_m": r.multipath.carrier,
+            "weighted": r.noise.weighted,
+            "reflection_m": r.multipath.detour,
+            "reflection_db": r.multipath.detour_loss_db,
+            "acquisition": round(r.tracking.acquisition / self.epochs.interval_s),
+            "slip_probability": r.tracking.slips_per_hour * self.epochs.interval_s / _HOUR_S,
+            "largest_slip": r.tracking.largest_slip,
+            "flag_probability": r.tracking.flagged,
+        }
+        for name, value in values.items():
+            one[name] = value
+        return one
+
+    def _remember(self, satellite: str, signal: str, table: Records) -> None:
+        """Slips, and arcs as (receiver, satellite, signal, first, last ns, cycles at first)."""
+        times = self.scene.start_ns + self.epochs.elapsed_ns
+        carrier = table["carrier"] != 0
+        slipped = np.flatnonzero(table["slip"])
+        for row in slipped.tolist():
+            self.slips.append(
+                {
+                    "receiver": self.receiver.name,
+                    "satellite": satellite,
+                    "signal": signal,
+                    "time_ns": int(times[row]),
+                    "cycles": int(table["slip"][row]),
+                    "flagged": bool(table["flag"][row]),
+                }
+            )
+        begin = np.flatnonzero(carrier & (table["lock_s"] == 0.0))
+        until = np.append(begin[1:], len(table))
+        held = np.flatnonzero(carrier)
+        for first, after in zip(begin.tolist(), until.tolist(), strict=True):
+            last = held[np.searchsorted(held, after) - 1]
+            self.arcs.append(
+                [self.receiver.name, satellite, signal, int(times[first]), int(times[last]),
+                 int(table["ambiguity"][first])]
+            )  # fmt: skip
+
+    def _columns(self, name: str, signal: str, table: Records, rows: Ints) -> Columns:
+        """Rows of one signal."""
+        kept = table[rows]
+        carrier = kept["carrier"] != 0
+        valid = self.scene.start_ns + self.epochs.elapsed_ns[rows]
+        latency = round(self.receiver.latency * time.NS_PER_S)
+        return Columns.build(
+            valid,
+            {
+                "satellite": np.full(len(rows), name, dtype="S3"),
+                "signal": np.full(len(rows), signal, dtype="S2"),
+                "pseudorange_m": kept["pseudorange_m"].copy(),
+                "carrier_phase_cycles": np.where(carrier, kept["carrier_cycles"], np.nan),
+                "doppler_hz": np.where(carrier, kept["doppler_hz"], np.nan),
+                "cn0_dbhz": kept["cn0_dbhz"].copy(),
+                "loss_of_lock": kept["flag"].astype(np.uint32),
+                "lock_time_s": np.where(carrier, kept["lock_s"], np.nan),
+            },
+            log_time_ns=valid + latency,
+            present={
+                field: carrier
+                for field in ("carrier_phase_cycles", "doppler_hz", "loss_of_lock", "lock_time_s")
+            },
+        )
+
+    def epoch_rows(self, measured: Columns) -> Columns:
+        """One row per epoch that is not in a gap; satellites are counted once."""
+        times = self.scene.start_ns + self.epochs.elapsed_ns[self.awake]
+        satellites = np.asarray(measured["satellite"])
+        first = np.ones(len(measured), dtype=np.bool_)
+        first[1:] = (satellites[1:] != satellites[:-1]) | (
+            measured.valid_time_ns[1:] != measured.valid_time_ns[:-1]
+        )
+        edges = np.searchsorted(measured.valid_time_ns[first], np.append(times, times[-1:] + 1))
+        values: dict[str, npt.NDArray[Any]] = {
+            "flag": np.zeros(len(times), dtype=np.uint32),
+            "satellite_count": np.diff(edges).astype(np.uint32),
+        }
+        if self.receiver.clock.reported:
+            values["clock_offset_s"] = self.epochs.clock[self.awake, 0].copy()
+        latency = round(self.receiver.latency * time.NS_PER_S)
+        return Columns.build(times, values, log_time_ns=times + latency)
+
+
+def butterworth_pole(cutoff_hz: float, interval_s: float) -> float:
+    """Pole of the bilinear transform of 1 / (1 + s / w), pre-warped to its cutoff."""
+    warped = float(elementary.tan(math.pi * cutoff_hz * interval_s))
+    return (1.0 - warped) / (1.0 + warped)
+
+
+def _renumbered(columns: Columns) -> Columns:
+    """The same rows, numbered from nought."""
+    sequence = np.arange(len(columns), dtype=np.uint32)
+    return dataclasses.replace(columns, sequence=sequence)
+
+
+def _information(receiver: Receiver, epochs: Epochs, scene: Scene) -> Columns:
+    """What is known of a receiver; of a vehicle's, the antenna's first place."""
+    return Columns.build(
+        [scene.start_ns],
+        {
+            "marker": Ragged.from_texts([receiver.name]),
+            "receiver": Ragged.from_texts(["simulated"]),
+            "antenna": Ragged.from_texts([""]),
+            "approximate_position_ecef_m": epochs.positions[:1].copy(),
+            "antenna_offset_enu_m": np.zeros((1, 3)),
+            "interval_s": np.array([epochs.interval_s]),
+            "header": Ragged.from_blobs([b""]),
+        },
+    )
+
+
+def _ionosphere(setup: Setup, start_ns: int) -> Columns:
+    """Broadcast coefficients: the same numbers for each system that has such a model."""
+    models: Mapping[str, int] = {
+        "G": navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR,
+        "J": navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR,
+        "C": navigation_pb2.IONOSPHERE_MODEL_BEIDOU,
+    }
+    systems = sorted(set(setup.sky.systems) & set(models)) or ["G"]
+    numbers = np.array([*setup.sky.ionosphere.alpha, *setup.sky.ionosphere.beta])
+    count = len(systems)
+    return Columns.build(
+        np.full(count, start_ns),
+        {
+            "system": np.array(systems, dtype="S1"),
+            "model": np.array([models[system] for system in systems], dtype=np.int32),
+            "coefficients": Ragged.from_matrix(np.tile(numbers, (count, 1))),
+        },
+    )

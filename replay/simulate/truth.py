@@ -1,0 +1,171 @@
+"""The sky as it is, and where each receiver truly was when its clock said so."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from replay import time
+from replay.errors import ConfigurationError
+from replay.kernels import elementary
+from replay.kernels.earth import enu_axes
+from replay.kernels.noise import gauss_markov
+from replay.kernels.observables import ATMOSPHERE_DTYPE, walk_clock
+from replay.kernels.trajectory import antenna_fixes
+from replay.simulate.constellation import constellation, name_of, perturb, refer
+from replay.simulate.noise import Floats, normals
+from replay.simulate.sky import Receiver, Setup
+from replay.simulate.trajectory import Trajectory, ecef_of
+
+Records = npt.NDArray[np.void]
+Ints = npt.NDArray[np.int64]
+
+_MILLISECOND: Final = 1e-3
+_PER_KM: Final = 1e3
+_NODES_PER_TAU: Final = 10.0
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """When and along what observations are made.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    origin : float64 array (3,), m, ECEF
+        Start of the vehicle.
+    start_ns, end_ns : int, ns
+        Of the log, GPS, and how long it is.
+    seed : int
+    """
+
+    trajectory: Trajectory
+    origin: Floats
+    start_ns: int
+    end_ns: int
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class TrueSky:
+    """Satellites as they are, and the atmosphere.
+
+    Attributes
+    ----------
+    satellites, broadcast : arrays (n,) of EPHEMERIS_DTYPE
+        Their true orbits and clocks, and what they say of them.
+    atmosphere : array (1,) of ATMOSPHERE_DTYPE
+    residuals : list of float64 arrays (3, m)
+        Of each satellite, as :func:`replay.kernels.observables.delays` takes them.
+    common_wet : float64 array (m,), m
+        Zenith wet delay at nodes.
+    """
+
+    satellites: Records
+    broadcast: Records
+    atmosphere: Records
+    residuals: list[Floats]
+    common_wet: Floats
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Epochs:
+    """Epochs of a receiver: its clock, and where its antenna truly was.
+
+    Attributes
+    ----------
+    elapsed_ns : int64 array (e,)
+        Reading of its clock since the start.
+    clock : float64 array (e, 2)
+        Bias (s) and drift (s/s).
+    positions, velocities : float64 arrays (e, 3), m and m/s, ECEF
+    headings : float64 array (e,), rad
+    interval_s : float, s
+    """
+
+    elapsed_ns: Ints
+    clock: Floats
+    positions: Floats
+    velocities: Floats
+    headings: Floats
+    interval_s: float
+
+
+def make_sky(setup: Setup, scene: Scene) -> TrueSky:
+    """Broadcast and true orbits, and nodes of what wanders."""
+    sky, seed = setup.sky, scene.seed
+    broadcast = constellation(sky.systems, seed, scene.start_ns)
+    true = broadcast.copy()
+    for index, record in enumerate(broadcast):
+        # Near the log, so that differences of rates have not grown since the week's start.
+        near = refer(record, scene.start_ns // time.NS_PER_S * time.NS_PER_S)
+        draw = normals(seed, f"ephemeris.{name_of(record)}", 1, 6)[0]
+        errors = sky.errors
+        true[index] = perturb(near, errors.orbit, errors.clock, errors.clock_tau, draw)
+    air = np.zeros(1, dtype=ATMOSPHERE_DTYPE)
+    iono, tropo = sky.ionosphere, sky.troposphere
+    air["ionosphere"], air["troposphere"] = iono.enabled, tropo.enabled
+    air["shapiro"], air["alpha"], air["beta"] = sky.shapiro, iono.alpha, iono.beta
+    air["scale"], air["humidity"] = iono.scale, tropo.humidity
+    air["ionosphere_spacing"] = iono.tau / _NODES_PER_TAU
+    air["wet_spacing"] = tropo.tau / _NODES_PER_TAU
+    air["origin"] = scene.origin
+    x, y, z = scene.origin.tolist()
+    enu_axes(x, y, z, air["axes"][0])
+    span_s = scene.end_ns / time.NS_PER_S
+    residuals = []
+    for record in true:
+        series = wander(seed, f"ionosphere.{name_of(record)}", iono.tau, span_s, 3)
+        series[0] *= iono.residual
+        series[1:] *= iono.gradient * _PER_KM
+        residuals.append(series)
+    wet = tropo.wet * wander(seed, "troposphere.wet", tropo.tau, span_s, 1)[0]
+    return TrueSky(true, broadcast, air, residuals, wet)
+
+
+def wander(seed: int, source: str, tau_s: float, span_s: float, count: int) -> Floats:
+    """Gauss-Markov sequences (count, n) of unit variance at nodes, for cubics between them."""
+    spacing = tau_s / _NODES_PER_TAU
+    rows = math.ceil(span_s / spacing) + 5  # one to spare at either end
+    series = normals(seed, source, rows, count)
+    decay = float(elementary.exp(-spacing / tau_s))
+    drive = math.sqrt(-float(elementary.expm1(-2.0 * spacing / tau_s)))
+    gauss_markov(1.0, decay, drive, series)
+    return np.ascontiguousarray(series.T)
+
+
+def make_epochs(receiver: Receiver, scene: Scene) -> Epochs:
+    """Epochs by the receiver's clock, and the antenna at their true times."""
+    period_ns = round(time.NS_PER_S / receiver.rate)
+    interval_s = period_ns / time.NS_PER_S
+    elapsed = np.arange(1, scene.end_ns // period_ns + 1, dtype=np.int64) * period_ns
+    clock = np.empty((len(elapsed), 2))
+    settings = receiver.clock
+    walk = normals(scene.seed, f"{receiver.name}.clock", len(elapsed), 1)[:, 0].copy()
+    jump = _MILLISECOND if settings.jumps else 0.0
+    walk_clock(settings.bias, settings.drift, settings.walk, interval_s, jump, walk, clock)
+    if len(clock) and np.abs(clock[:, 0]).max() > interval_s:
+        raise ConfigurationError(
+            "the clock drifts away by more than an interval",
+            where=receiver.name,
+            mend="give it less drift, or jumps = true",
+        )
+    count = len(elapsed)
+    if receiver.kind == "static":
+        place = np.array(receiver.position) if receiver.position else ecef_of(
+            receiver.latitude, receiver.longitude, receiver.height
+        )  # fmt: skip
+        still = np.zeros((count, 3))
+        return Epochs(
+            elapsed, clock, np.tile(place, (count, 1)), still, np.zeros(count), interval_s
+        )
+    true_s = elapsed / time.NS_PER_S - clock[:, 0] - receiver.delay
+    poses = scene.trajectory.poses(np.maximum(true_s, 0.0))
+    positions, velocities, none = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, 3))
+    antenna_fixes(poses, np.array(receiver.lever_arm), none, none, positions, velocities)
+    headings = np.ascontiguousarray(poses["attitude"][:, 2])
+    return Epochs(elapsed, clock, positions, velocities, headings, interval_s)
