@@ -82,6 +82,7 @@ class Replayer:
         self.traces = [StageTrace(node) for node in self.nodes]
         self.states = [self._start(node) for node in self.nodes]
         self.depth = 1 + max(node.depth for node in self.nodes)
+        self._numbered: dict[str, int] = {}
         self._trace_rows = 0
         self._checkpoint_rows = 0
         self._first_ns = -1
@@ -212,12 +213,17 @@ class Replayer:
             for name, rows in outputs.items()
         }
 
-    @staticmethod
-    def _encoded(node: Node, outputs: Mapping[str, Columns]) -> dict[str, Columns]:
+    def _encoded(self, node: Node, outputs: Mapping[str, Columns]) -> dict[str, Columns]:
+        """Rows of a stage by topic, numbered through the whole run, with their payloads."""
         specs = {port.name: port.channel for port in node.stage.spec.outputs}
-        return {
-            node.outputs[name]: encoded(specs[name], columns) for name, columns in outputs.items()
-        }
+        rows: dict[str, Columns] = {}
+        for name, columns in outputs.items():
+            topic = node.outputs[name]
+            first = self._numbered.get(topic, 0)
+            self._numbered[topic] = first + len(columns)
+            sequence = np.arange(first, first + len(columns), dtype=np.uint32)
+            rows[topic] = encoded(specs[name], dataclasses.replace(columns, sequence=sequence))
+        return rows
 
     def _write(self, rows: Mapping[str, Columns], traces: list[Columns | None], sink: Sink) -> None:
         """Write rows, and the trace rows of all stages merged by time."""
@@ -285,6 +291,7 @@ class Replayer:
             for trace in copied:
                 trace.update(kept)
             sink.write(kept)
+        self._numbered = {topic: count for topic, count in counts.items() if count}
         self._trace_rows = counts[TRACE.topic]
         self._checkpoint_rows = counts[CHECKPOINT.topic]
         self._require_whole(resume, at_ns, counts, copied)

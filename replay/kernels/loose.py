@@ -35,6 +35,7 @@ from replay.kernels.records import (
     STATUS_PREDICTED,
     STATUS_UPDATED,
 )
+from replay.kernels.tdcp_link import begin_chain, use_link
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event
 
@@ -98,7 +99,7 @@ def _use_fix(
 
 
 @njit(cache=True)
-def _constrain(
+def constrain(
     s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Array, ...]
 ) -> None:
     """Stops and non-holonomic updates at an inertial sample."""
@@ -130,7 +131,8 @@ def _constrain(
 
 
 @njit(cache=True)
-def _finite(a: Array) -> bool:
+def all_finite(a: Array) -> bool:
+    """Whether three numbers are neither NaN nor infinite."""
     total = a[0] + a[1] + a[2]
     return total - total == 0.0
 
@@ -153,7 +155,7 @@ def _take_fixes(
     while k < fixes.shape[0] and fixes[k]["t"] <= t and fixes[k]["log_t"] <= log_t:
         fix = fixes[k]
         k += 1
-        if not (_finite(fix["r"]) and _finite(fix["R"]) and _finite(fix["R"][3:])):
+        if not (all_finite(fix["r"]) and all_finite(fix["R"]) and all_finite(fix["R"][3:])):
             record_event(events, counts, fix["t"], log_t, EVENT_NOT_FINITE, 0.0, NOTE_FIX)
             continue
         if s["mode"] != RUNNING:
@@ -162,6 +164,9 @@ def _take_fixes(
             elif align_fix(s, cfg, work, fix, log_t, events, counts):
                 s["fix_t"] = fix["t"]
                 mark_epoch(s, fix)
+                if fix["chain"] > 0:
+                    begin_chain(s, cfg, fix)
+                    s["chain_t"] = fix["t"]
                 s["stop_last"] = fix["t"]
                 s["nhc_last"] = fix["t"]
                 emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
@@ -175,7 +180,10 @@ def _take_fixes(
             # The last word before help arrives: this is where drift is read off.
             emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
         advance(s, cfg, work, fix["t"])
-        _use_fix(s, cfg, work, fix, log_t, out)
+        if fix["chain"] > 0:
+            use_link(s, cfg, work, fix, log_t, out)
+        else:
+            _use_fix(s, cfg, work, fix, log_t, out)
     if early > 0:
         record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, float(early), NOTE_EARLY)
     return k
@@ -234,7 +242,7 @@ def run_block(
     for k in range(imu_t.shape[0]):
         t = imu_t[k]
         log_t = imu_log_t[k]
-        if not (_finite(imu_w[k]) and _finite(imu_f[k])):
+        if not (all_finite(imu_w[k]) and all_finite(imu_f[k])):
             record_event(events, counts, t, log_t, EVENT_NOT_FINITE, 0.0, NOTE_IMU)
             continue
         if s["imu_t"] < 0:
@@ -267,7 +275,7 @@ def run_block(
         advance(s, cfg, work, t)
         if not aligning:
             push_sample(s, w_raw, f_raw)
-        _constrain(s, cfg, work, t, log_t, out)
+        constrain(s, cfg, work, t, log_t, out)
         slot = t // cfg["solution_interval"]
         if slot > s["emitted_slot"]:
             s["emitted_slot"] = slot

@@ -6,7 +6,7 @@ from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY, propagate
 from replay.kernels.elementary import exp
 from replay.kernels.strapdown import mechanize
 from replay.kernels.types import Array, Record
-from replay.kernels.update import state_count
+from replay.kernels.update import total_count
 
 
 @njit(cache=True)
@@ -29,7 +29,7 @@ def _decay_and_noise(cfg: Record, work: Record, dt: float) -> None:
         for i in range(cfg["states"], cfg["states"] + 2):
             decay[i] = 1.0
             noise[i] = cfg["mounting_noise"] * cfg["mounting_noise"] * dt
-    for i in range(cfg["states"] + 2 * cfg["mounting"], state_count(cfg)):
+    for i in range(cfg["states"] + 2 * cfg["mounting"], decay.shape[0]):
         decay[i] = 1.0
         noise[i] = 0.0
 
@@ -72,7 +72,7 @@ def advance(s: Record, cfg: Record, work: Record, t: int) -> None:
     mechanize(nav, w[0] * dt, w[1] * dt, w[2] * dt, f[0] * dt, f[1] * dt, f[2] * dt, dt, work["q"])
     _decay_and_noise(cfg, work, dt)
     propagate(
-        s["P"], state_count(cfg), cfg["states"] == 21, nav["r"], nav["C"], nav["f_e"], f, w, dt,
+        s["P"], total_count(s, cfg), cfg["states"] == 21, nav["r"], nav["C"], nav["f_e"], f, w, dt,
         work["decay"], work["noise"], work["T"],
     )  # fmt: skip
     smooth = 1.0

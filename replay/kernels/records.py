@@ -10,8 +10,13 @@ import numpy as np
 
 from replay.kernels.strapdown import NAVIGATION_DTYPE
 
-MAX_STATES: Final = 26
+MAX_STATES: Final = 29  # 26, and the three of a place that displacements are counted from
 WINDOW: Final = 512  # inertial samples that the stop detector can look back at most
+
+# What an epoch of a chain is.
+LINK_BEGIN: Final = 1  # its first one
+LINK_SUM: Final = 2  # compared with the place at its beginning
+LINK_EACH: Final = 3  # compared with the place at the epoch before
 
 # How far the filter has come.
 WAITING: Final = 0  # for rest, or for motion
@@ -89,53 +94,67 @@ CONFIG_DTYPE: Final = np.dtype(
     align=True,
 )
 
-STATE_DTYPE: Final = np.dtype(
-    [
-        ("mode", "<i8"),
-        ("t", "<i8"),  # ns, GPS: time of the navigation state
-        ("imu_t", "<i8"),  # ns, of the last inertial sample; minus one before the first
-        ("nav", NAVIGATION_DTYPE),
-        ("P", "<f8", (MAX_STATES, MAX_STATES)),
-        ("bg", "<f8", 3),  # rad/s
-        ("ba", "<f8", 3),  # m/s^2
-        ("sg", "<f8", 3),
-        ("sa", "<f8", 3),
-        ("mount", "<f8", 2),  # rad: pitch, yaw of the vehicle relative to the body
-        ("point", "<f8", 3),  # m, body: where the vehicle does not slip
-        ("squat", "<f8"),  # rad/(m/s^2), per forward specific force, negative where the nose lifts
-        ("w_smooth", "<f8", 3),  # rad/s, low-passed rate
-        ("f_smooth", "<f8", 3),  # m/s^2, low-passed specific force
-        ("w_raw", "<f8", 3),  # rad/s, last sample
-        ("f_raw", "<f8", 3),  # m/s^2, last sample
-        # stop detector
-        ("window", "<f8", (WINDOW, 6)),
-        ("window_head", "<i8"),
-        ("window_count", "<i8"),
-        ("stopped", "<i8"),
-        ("stop_last", "<i8"),  # ns of the last stop decision
-        ("nhc_last", "<i8"),  # ns of the last non-holonomic update
-        # alignment
-        ("rest_count", "<i8"),
-        ("rest_sum", "<f8", 6),  # over the samples at rest
-        ("rest_q", "<f8", 4),  # body at rest to a level frame of unknown heading
-        ("rest_f", "<f8", 3),  # m/s^2, mean specific force at rest, body
-        ("align_q", "<f8", 4),  # body now to the same frame
-        ("align_v", "<f8", 3),  # m/s in the same frame, since the last rest
-        ("align_fix_t", "<i8"),  # ns of the fix before, minus one where there is none
-        ("align_fix_r", "<f8", 3),  # m, ECEF
-        ("align_speed", "<f8"),  # m/s at the fix before, minus one where unknown
-        # GNSS bookkeeping
-        ("fix_t", "<i8"),  # ns of the last position that was used
-        ("moved_t", "<i8"),  # ns since when displacement is summed
-        ("moved", "<f8", 3),  # m, ECEF: integral of velocity since then
-        ("moved_lever", "<f8", 3),  # m, ECEF: antenna lever arm then
-        ("rejected", "<i8"),  # positions in a row
-        ("in_outage", "<i8"),
-        ("emitted_slot", "<i8"),  # solution intervals since the GPS epoch at the last row
-        ("emitted_t", "<i8"),  # ns of the last row
-    ],
-    align=True,
-)
+
+def state_dtype(states: int) -> "np.dtype[np.void]":
+    """Record of a filter with room for so many error states."""
+    return np.dtype(
+        [
+            ("mode", "<i8"),
+            ("t", "<i8"),  # ns, GPS: time of the navigation state
+            ("imu_t", "<i8"),  # ns, of the last inertial sample; minus one before the first
+            ("nav", NAVIGATION_DTYPE),
+            ("P", "<f8", (states, states)),
+            ("extra", "<i8"),  # states after those of the inertial system and the vehicle
+            ("aux", "<f8", states),  # their values
+            ("bg", "<f8", 3),  # rad/s
+            ("ba", "<f8", 3),  # m/s^2
+            ("sg", "<f8", 3),
+            ("sa", "<f8", 3),
+            ("mount", "<f8", 2),  # rad: pitch, yaw of the vehicle relative to the body
+            ("point", "<f8", 3),  # m, body: where the vehicle does not slip
+            (
+                "squat",
+                "<f8",
+            ),  # rad/(m/s^2), per forward specific force, negative where the nose lifts
+            ("w_smooth", "<f8", 3),  # rad/s, low-passed rate
+            ("f_smooth", "<f8", 3),  # m/s^2, low-passed specific force
+            ("w_raw", "<f8", 3),  # rad/s, last sample
+            ("f_raw", "<f8", 3),  # m/s^2, last sample
+            # stop detector
+            ("window", "<f8", (WINDOW, 6)),
+            ("window_head", "<i8"),
+            ("window_count", "<i8"),
+            ("stopped", "<i8"),
+            ("stop_last", "<i8"),  # ns of the last stop decision
+            ("nhc_last", "<i8"),  # ns of the last non-holonomic update
+            # alignment
+            ("rest_count", "<i8"),
+            ("rest_sum", "<f8", 6),  # over the samples at rest
+            ("rest_q", "<f8", 4),  # body at rest to a level frame of unknown heading
+            ("rest_f", "<f8", 3),  # m/s^2, mean specific force at rest, body
+            ("align_q", "<f8", 4),  # body now to the same frame
+            ("align_v", "<f8", 3),  # m/s in the same frame, since the last rest
+            ("align_fix_t", "<i8"),  # ns of the fix before, minus one where there is none
+            ("align_fix_r", "<f8", 3),  # m, ECEF
+            ("align_speed", "<f8"),  # m/s at the fix before, minus one where unknown
+            # GNSS bookkeeping
+            ("fix_t", "<i8"),  # ns of the last position that was used
+            ("moved_t", "<i8"),  # ns since when displacement is summed
+            ("moved", "<f8", 3),  # m, ECEF: integral of velocity since then
+            ("moved_lever", "<f8", 3),  # m, ECEF: antenna lever arm then
+            ("rejected", "<i8"),  # positions in a row
+            ("in_outage", "<i8"),
+            ("emitted_slot", "<i8"),  # solution intervals since the GPS epoch at the last row
+            ("emitted_t", "<i8"),  # ns of the last row
+            # chain of displacements
+            ("chain_t", "<i8"),  # ns of its last epoch
+            ("chain_sum", "<f8", 3),  # m, ECEF, since the place in `aux`
+        ],
+        align=True,
+    )
+
+
+STATE_DTYPE: Final = state_dtype(MAX_STATES)
 
 FIX_DTYPE: Final = np.dtype(
     [
@@ -147,6 +166,13 @@ FIX_DTYPE: Final = np.dtype(
         ("v", "<f8", 3),
         ("V", "<f8", 6),  # m^2/s^2
         ("lever", "<f8", 3),
+        ("window", "<f8"),  # s that the velocity is the mean of; 0 asks the settings
+        # An epoch of a chain of displacements.
+        ("chain", "<i8"),  # 0: none, a place; else one of the numbers below
+        ("anchor", "<i8"),  # 1: where a chain begins the place counts as well
+        ("since", "<i8"),  # ns of the epoch before
+        ("d", "<f8", 3),  # m, ECEF, since then
+        ("D", "<f8", 6),  # m^2, of what is compared
     ],
     align=True,
 )
@@ -204,35 +230,40 @@ EVENT_DTYPE: Final = np.dtype(
     align=True,
 )
 
-# Scratch of one filter; its contents never outlive a step.
-WORK_DTYPE: Final = np.dtype(
-    [
-        ("T", "<f8", (MAX_STATES + 1, MAX_STATES + 1)),
-        ("decay", "<f8", MAX_STATES),
-        ("noise", "<f8", MAX_STATES),
-        ("H", "<f8", (3, MAX_STATES)),
-        ("h", "<f8", (3, MAX_STATES + 1)),
-        ("index", "<i8", MAX_STATES),
-        ("PH", "<f8", (3, MAX_STATES)),
-        ("S", "<f8", (3, 3)),
-        ("R", "<f8", (3, 3)),
-        ("L", "<f8", (3, 3)),
-        ("z", "<f8", 3),
-        ("b", "<f8", MAX_STATES),
-        ("gain", "<f8", MAX_STATES),
-        ("dx", "<f8", MAX_STATES),
-        ("q", "<f8", (2, 4)),
-        ("axes", "<f8", (3, 3)),  # rows: unit vectors of the measurement's axes in ECEF
-        ("M", "<f8", (3, 3)),
-        ("N", "<f8", (3, 3)),
-        ("f", "<f8", 3),  # m/s^2, body, sensor errors removed
-        ("w", "<f8", 3),  # rad/s, body, sensor errors removed
-        ("mean", "<f8", 6),
-        ("part", "<f8", 6),
-        ("decay_dt", "<f8"),  # s, interval that decay and noise belong to
-    ],
-    align=True,
-)
+
+def work_dtype(states: int) -> "np.dtype[np.void]":
+    """Scratch of a filter with room for so many error states; nothing in it outlives a step."""
+    return np.dtype(
+        [
+            ("T", "<f8", (states + 1, states + 1)),
+            ("decay", "<f8", states),
+            ("noise", "<f8", states),
+            ("H", "<f8", (3, states)),
+            ("h", "<f8", (3, states + 1)),
+            ("index", "<i8", states),
+            ("PH", "<f8", (3, states)),
+            ("S", "<f8", (3, 3)),
+            ("R", "<f8", (3, 3)),
+            ("L", "<f8", (3, 3)),
+            ("z", "<f8", 3),
+            ("b", "<f8", states),
+            ("gain", "<f8", states),
+            ("dx", "<f8", states),
+            ("q", "<f8", (2, 4)),
+            ("axes", "<f8", (3, 3)),  # rows: unit vectors of the measurement's axes in ECEF
+            ("M", "<f8", (3, 3)),
+            ("N", "<f8", (3, 3)),
+            ("f", "<f8", 3),  # m/s^2, body, sensor errors removed
+            ("w", "<f8", 3),  # rad/s, body, sensor errors removed
+            ("mean", "<f8", 6),
+            ("part", "<f8", 6),
+            ("decay_dt", "<f8"),  # s, interval that decay and noise belong to
+        ],
+        align=True,
+    )
+
+
+WORK_DTYPE: Final = work_dtype(MAX_STATES)
 
 # Numbers of schemas/filter.proto and schemas/solution.proto; a test compares them.
 KIND_POSITION: Final = 1
@@ -259,9 +290,9 @@ STATUS_UPDATED: Final = 2
 STATUS_OUTAGE: Final = 3
 
 
-def new_state() -> np.ndarray[Any, Any]:
-    """One state record of a filter that has seen nothing."""
-    state = np.zeros(1, dtype=STATE_DTYPE)
+def new_state(states: int = MAX_STATES) -> np.ndarray[Any, Any]:
+    """One state record of a filter that has seen nothing, with room for so many error states."""
+    state = np.zeros(1, dtype=state_dtype(states))
     for name in ("imu_t", "align_fix_t", "fix_t", "moved_t", "emitted_t", "stop_last"):
         state[name] = -1
     state["nhc_last"] = -1

@@ -31,8 +31,14 @@ from replay.kernels.types import Array, Record
 
 @njit(cache=True)
 def state_count(cfg: Record) -> int:
-    """Number of error states of a configuration."""
+    """Number of error states of the inertial system and the vehicle."""
     return cfg["states"] + 2 * cfg["mounting"] + 2 * cfg["lever"] + cfg["squat"]
+
+
+@njit(cache=True)
+def total_count(s: Record, cfg: Record) -> int:
+    """Number of error states at this moment, those of satellites and clocks included."""
+    return state_count(cfg) + s["extra"]
 
 
 @njit(cache=True)
@@ -64,12 +70,15 @@ def feed_back(s: Record, cfg: Record, dx: Array, scratch: Array) -> None:
         mount[0] += dx[cfg["states"]]
         mount[1] += dx[cfg["states"] + 1]
     if cfg["lever"] == 1:
-        first = cfg["states"] + 2 * cfg["mounting"]
+        k = cfg["states"] + 2 * cfg["mounting"]
         point = s["point"]
-        point[0] += dx[first]
-        point[2] += dx[first + 1]
+        point[0] += dx[k]
+        point[2] += dx[k + 1]
     if cfg["squat"] == 1:
         s["squat"] += dx[state_count(cfg) - 1]
+    first, aux = state_count(cfg), s["aux"]
+    for i in range(s["extra"]):
+        aux[i] += dx[first + i]
     quaternion_from_vector(dx[ATTITUDE], dx[ATTITUDE + 1], dx[ATTITUDE + 2], scratch[0])
     quaternion_multiply(scratch[0], q, scratch[1])
     for i in range(4):
@@ -167,7 +176,7 @@ def update(
     P = s["P"]
     H, index, z, R = work["H"], work["index"], work["z"], work["R"]
     S, L = work["S"], work["L"]
-    n = state_count(cfg)
+    n = total_count(s, cfg)
     innovation_covariance(P, n, H, index, count, R, k, work["PH"], S)
     accepted = cholesky3(S, k, L)
     if accepted and gate > 0.0 and not force:

@@ -17,6 +17,10 @@ EVENT_TEXT: Final = {
     13: "{satellite}: no usable broadcast message",
     14: "{value:.0f} satellites are too few for a position",
     15: "no position from {value:.0f} satellites",
+    16: "{satellite} left out: its phase jumped by {value:.2f} cycles",
+    17: "{satellite}: a jump of {value:.1f} cycles is taken off its phase",
+    18: "chain of displacements broken after {value:.1f} s",
+    21: "the receiver's clock jumped by {value:.4f} ms",
 }
 _COUNTS: Final = ("gps_count", "glonass_count", "galileo_count", "beidou_count", "qzss_count")
 _DOPS: Final = ("gdop", "pdop", "hdop", "vdop")

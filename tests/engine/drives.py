@@ -272,7 +272,7 @@ def content(name: str, columns: Columns) -> tuple[bytes, ...]:
     """Times, numbers and payloads of some rows."""
     spec = {s.name: s for s in channels.CHANNELS}[name]
     payloads = codec.codec_for(spec.message).encode(columns)
-    times = (columns.log_time_ns, columns.valid_time_ns, columns.sequence)
+    times = (columns.log_time_ns, columns.valid_time_ns)
     return (*(part.tobytes() for part in times), *payloads.blobs())
 
 
