@@ -15,7 +15,7 @@ from replay.importers.geodesy import Places
 from replay.importers.navbits import Ionosphere
 from replay.importers.table import Float64, Int64, Mask
 from replay.kernels.ephemeris import EPHEMERIS_DTYPE
-from replay.log.columns import Column, Columns, Ragged, concatenate
+from replay.log.columns import Column, Columns, Ragged
 
 Names = npt.NDArray[np.bytes_]
 
@@ -342,10 +342,3 @@ def _ionosphere_columns(rows: list[Ionosphere]) -> Columns:
             ),
         },
     )
-
-
-def merge(found: dict[str, list[Columns]]) -> dict[str, Columns]:
-    """Rows of each topic in the order of their times; topics without rows are left out."""
-    return {
-        topic: ordered(concatenate(parts)) for topic, parts in found.items() if sum(map(len, parts))
-    }
