@@ -39,6 +39,7 @@ def key_figures(evaluation: Evaluation) -> Figures:
     ):
         if statistics is not None:
             figures[name] = {a: round(s.rms, LENGTH_DIGITS) for a, s in statistics.items()}
+    figures |= _gnss_figures(evaluation)
     nees = evaluation.nees
     blocks = {"position": nees.position, "velocity": nees.velocity, "attitude": nees.attitude}
     means = {name: block.mean for name, block in blocks.items() if block is not None}
@@ -77,6 +78,37 @@ def key_figures(evaluation: Evaluation) -> Figures:
     }
     figures["counts"] = {name: count for name, count in rows.items() if count is not None}
     return {name: group for name, group in figures.items() if group}
+
+
+def _gnss_figures(evaluation: Evaluation) -> Figures:
+    """What only a run over observations has: changes of position, satellites, integers."""
+    figures: Figures = {}
+    if evaluation.geometry is None and evaluation.ambiguities is None:
+        return figures
+    for name, statistics in (
+        ("position_change_rms_m", evaluation.position_change_error_m),
+        ("position_change_std_m", evaluation.position_change_error_m),
+        ("position_fixed_rms_m", evaluation.position_error_fixed_m),
+    ):
+        if statistics is not None:
+            figure = "std" if "_std_" in name else "rms"
+            figures[name] = {
+                a: round(float(getattr(s, figure)), LENGTH_DIGITS) for a, s in statistics.items()
+            }
+    if evaluation.geometry is not None:
+        for name, spreads in (
+            ("satellites_mean", evaluation.geometry.satellites),
+            ("pdop_mean", evaluation.geometry.pdop),
+        ):
+            figures[name] = {s: round(found.mean, RATIO_DIGITS) for s, found in spreads.items()}
+    found = evaluation.ambiguities
+    if found is not None:
+        figures["epoch_share"] = {n: round(s, RATIO_DIGITS) for n, s in found.share.items()}
+        counts = {"wrong": found.wrong_fixes, "longest_wrong_run": found.longest_wrong_run}
+        figures["fixes"] = {n: count for n, count in counts.items() if count is not None}
+    if evaluation.availability is not None:
+        figures["availability"] = {"share": round(evaluation.availability.share, RATIO_DIGITS)}
+    return figures
 
 
 def moved(

@@ -1,16 +1,25 @@
-"""Commands that look at runs: evaluate, diff, view, report."""
+"""Commands that look at runs: evaluate, compare, diff, view, report."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.cli.arguments import Output
 from replay.errors import ExitCode, MissingChannelError, UsageError
+
+if TYPE_CHECKING:
+    from replay.evaluate.compare import Method
+    from replay.view.scenes import Stretch
+
+WrongFixLimit = Annotated[
+    float,
+    typer.Option("--wrong-fix-limit", help="Horizontal error in metres over which a fix is wrong."),
+]
 
 
 @app.command()
@@ -23,15 +32,93 @@ def evaluate(
     fixed_truth_only: Annotated[
         bool, typer.Option("--fixed-truth-only", help="Leave out truth that is not fixed.")
     ] = False,
+    wrong_fix_limit: WrongFixLimit = 0.10,
 ) -> None:
     """Compare a run with the truth in its log."""
     from replay.evaluate import evaluate_run, print_evaluation
 
-    evaluation = evaluate_run(log, run=run, fixed_truth_only=fixed_truth_only)
+    evaluation = evaluate_run(
+        log, run=run, fixed_truth_only=fixed_truth_only, wrong_fix_limit_m=wrong_fix_limit
+    )
     if as_json:
         typer.echo(json.dumps(evaluation.to_json_dict(), indent=2))
     else:
         print_evaluation(evaluation, out)
+
+
+@app.command()
+def compare(
+    logs: Annotated[list[Path], typer.Argument(help="Logs of runs, with truth.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write one self-contained HTML page.")
+    ] = None,
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Render the recording to a picture too.")] = None,
+    scene: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="START,END of a stretch to show closely, seconds as on the page's axes or"
+            " dates; may be repeated. Without it three are chosen."
+        ),
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
+    fixed_truth_only: Annotated[
+        bool, typer.Option("--fixed-truth-only", help="Leave out truth that is not fixed.")
+    ] = False,
+    wrong_fix_limit: WrongFixLimit = 0.10,
+) -> None:
+    """Compare methods: every run of every log against truth, in one table."""
+    from replay.evaluate.compare import read_methods, to_json_dict
+    from replay.evaluate.compare_table import markdown, print_comparison
+
+    if png is not None and rrd is None:
+        raise UsageError("--png renders a recording", mend="give --rrd FILE too")
+    methods = read_methods(
+        logs, fixed_truth_only=fixed_truth_only, wrong_fix_limit_m=wrong_fix_limit
+    )
+    scenes = _scenes(methods, scene) if scene else None
+    if as_json:
+        typer.echo(json.dumps(to_json_dict(methods), indent=2))
+    elif as_markdown:
+        typer.echo(markdown(methods))
+    else:
+        print_comparison(methods, out)
+    if output is not None:
+        from replay.view.compare_report import write_comparison
+
+        write_comparison(methods, output, scenes=scenes, title=title or "Comparison of methods")
+        warn(f"report: {output}")
+    if rrd is not None:
+        from replay.view.compare_recording import write_compared
+
+        write_compared(methods, rrd, scenes=scenes)
+        warn(f"recording: {rrd} (open it with: rerun {rrd})")
+        if png is not None:
+            from replay.view.picture import render_png
+
+            render_png(rrd, png)
+            warn(f"picture: {png}")
+
+
+def _scenes(methods: list[Method], texts: list[str]) -> list[Stretch]:
+    """Stretches that a person wrote; seconds count from the first solution."""
+    from replay.engine.moments import parse_time
+    from replay.view.compare_panels import span_of
+    from replay.view.scenes import Stretch
+
+    start_ns, _ = span_of(methods)
+    found: list[Stretch] = []
+    for text in texts:
+        first, comma, last = text.partition(",")
+        if not comma:
+            raise UsageError(f"{text!r} is no scene", mend="write --scene START,END, as in 40,55")
+        begin, end = parse_time(first, start_ns), parse_time(last, start_ns)
+        if end <= begin:
+            raise UsageError(f"the scene {text!r} ends before it begins", mend="write START,END")
+        found.append(Stretch("Scene", begin, end))
+    return found
 
 
 @app.command()
@@ -105,11 +192,16 @@ def report(
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
 ) -> None:
     """Write one self-contained HTML page about a run."""
-    from replay.evaluate import evaluate_run
+    from replay.evaluate import evaluate_run, runs_of
     from replay.view.report import write_report
 
+    evaluation: dict[str, Any] | None
     try:
-        evaluation = evaluate_run(log).to_json_dict()
+        names = runs_of(log)
+        if len(names) > 1:
+            evaluation = {name: evaluate_run(log, run=name).to_json_dict() for name in names}
+        else:
+            evaluation = evaluate_run(log).to_json_dict()
     except MissingChannelError as error:
         evaluation = None
         warn(f"no figures against truth: {error.what}")

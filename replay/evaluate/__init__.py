@@ -1,7 +1,8 @@
 """A run against truth: errors, drift in outages, consistency of the filter."""
 
+from replay.evaluate.read import RunChannels, read_run, runs_of
 from replay.evaluate.report import Evaluation
-from replay.evaluate.run import RunChannels, evaluate_channels, evaluate_run, read_run
+from replay.evaluate.run import evaluate_channels, evaluate_run
 from replay.evaluate.table import print_evaluation
 
 __all__ = [
@@ -11,4 +12,5 @@ __all__ = [
     "evaluate_run",
     "print_evaluation",
     "read_run",
+    "runs_of",
 ]

@@ -76,7 +76,7 @@ class Nees(msgspec.Struct, frozen=True, kw_only=True):
     ----------
     position, velocity, attitude : Consistency or None
         Position with its full covariance, the others with standard deviations only;
-        None where truth does not have the quantity.
+        None where truth or the solution does not have the quantity.
     truth_is_measurement : bool
         Whether truth was measured together with the fixes.
     cautions : tuple of str
@@ -133,8 +133,13 @@ def covariance_squares(errors: Errors, packed: Floats) -> tuple[Floats, int]:
     return np.asarray((values * solved).sum(axis=1)), int(np.count_nonzero(~usable))
 
 
-def deviation_squares(errors: Errors, deviations: Floats) -> tuple[Floats, int]:
-    """Normalised squares of errors with standard deviations (n, 3), otherwise as above."""
+def deviation_squares(errors: Errors, deviations: Floats | None) -> tuple[Floats, int]:
+    """Normalised squares of errors with standard deviations (n, 3), otherwise as above.
+
+    None where the solution states no deviations: then there is no square and no rejection.
+    """
+    if deviations is None:
+        return np.empty(0), 0
     sigma = deviations[errors.rows].astype(np.float64)
     usable = (np.isfinite(sigma) & (sigma > 0.0)).all(axis=1)
     ratio = errors.values[usable] / sigma[usable]
@@ -162,8 +167,8 @@ def nees(
     """
     blocks = (
         covariance_squares(position, np.asarray(solution["position_covariance_enu_m2"])),
-        deviation_squares(velocity, np.asarray(solution["velocity_std_enu_m_s"])),
-        deviation_squares(rotation, np.asarray(solution["attitude_std_rad"])),
+        deviation_squares(velocity, _deviations(solution, "velocity_std_enu_m_s")),
+        deviation_squares(rotation, _deviations(solution, "attitude_std_rad")),
     )
     found = [consistency_of(squares, _DIMENSION, rejected) for squares, rejected in blocks]
     cautions = (CAUTION_CORRELATED, *((CAUTION_MEASUREMENT,) if truth_is_measurement else ()))
@@ -174,6 +179,12 @@ def nees(
         truth_is_measurement=truth_is_measurement,
         cautions=cautions,
     )
+
+
+def _deviations(solution: Columns, field: str) -> Floats | None:
+    if field not in solution.values:
+        return None
+    return solution[field].astype(np.float64)
 
 
 def nis(innovations: Columns) -> dict[str, dict[str, Consistency]]:

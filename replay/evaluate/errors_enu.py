@@ -2,19 +2,27 @@
 
 A solution is about the IMU's origin, truth about a point at its own lever arm. The
 solution is moved there with its own attitude and turn rate, because that is what its
-user would do.
+user would do. A row that has no attitude is about an antenna and is compared as it
+stands: how far the antenna is from the truth's point cannot be known.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from replay.evaluate.align import Aligned, Rows, align, known_rows, truth_positions
 from replay.evaluate.geometry import Floats, body_to_enu, enu_axes, turn, turn_back, wrapped
 from replay.log.columns import Columns
+
+Mask = npt.NDArray[np.bool_]
+
+LONGEST_STEP: Final = 1.5  # of median intervals between consecutive epochs
+_PAIR: Final = 2
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +45,7 @@ class Errors:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def take(self, keep: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Errors:
+    def take(self, keep: Mask) -> Errors:
         """Some of the errors, by a mask (m,)."""
         return Errors(self.rows[keep], self.times_ns[keep], self.values[keep])
 
@@ -57,13 +65,63 @@ def position_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     Errors
         East, north, up [m].
     """
+    aligned, point, reference = _points(solution, truth, fixed_only=fixed_only)
+    return _finite(solution, aligned, turn(enu_axes(reference), point - reference))
+
+
+def position_change_errors(
+    solution: Columns, truth: Columns, epochs: Mask, *, fixed_only: bool = False
+) -> Errors:
+    """Errors of the change of position from each epoch to the next.
+
+    What the solution says of r_k - r_(k-1) less what truth says of it (Tang et al. 2021,
+    table 4). A constant error has no part in it.
+
+    Parameters
+    ----------
+    solution, truth, fixed_only
+        As in :func:`position_errors`; rows of the solution in the order of time.
+    epochs : bool array (n,)
+        Rows of the solution that are epochs. Only those count as consecutive that are at
+        most 1.5 median intervals of them apart and both have truth.
+
+    Returns
+    -------
+    Errors
+        East, north, up at the later epoch [m]; rows are those of the later epoch.
+    """
+    rows = np.flatnonzero(epochs)
+    if len(rows) < _PAIR:
+        return _none()
+    times = solution.valid_time_ns[rows]
+    last = np.append(np.diff(times) > 0, True)  # of one time the last row is the epoch's
+    rows, times = rows[last], times[last]
+    aligned, point, reference = _points(solution, truth, fixed_only=fixed_only)
+    errors = np.full((len(solution), 3), np.nan)
+    errors[aligned.rows] = point - reference
+    places = np.full((len(solution), 3), np.nan)
+    places[aligned.rows] = reference
+    steps = np.diff(times)
+    if len(steps) == 0:
+        return _none()
+    change = errors[rows[1:]] - errors[rows[:-1]]
+    keep = steps <= LONGEST_STEP * float(np.median(steps))
+    keep &= np.isfinite(change).all(axis=1)
+    later = rows[1:][keep]
+    return Errors(later, solution.valid_time_ns[later], turn(enu_axes(places[later]), change[keep]))
+
+
+def _points(
+    solution: Columns, truth: Columns, *, fixed_only: bool
+) -> tuple[Aligned, Floats, Floats]:
+    """The solution at the truth's point, and truth, ECEF (m, 3) [m], where truth is known."""
     known = known_rows(truth, "position_ecef_m", fixed_only=fixed_only)
     aligned = align(solution.valid_time_ns, known.valid_time_ns)
     reference = truth_positions(aligned, known)
     origin = solution["position_ecef_m"][aligned.rows].astype(np.float64)
     arm_enu = turn(_attitudes(solution, aligned), _lever_arms(aligned, known))
-    point = origin + turn_back(enu_axes(origin), arm_enu)
-    return _finite(solution, aligned, turn(enu_axes(reference), point - reference))
+    arm_enu[of_antenna(solution)[aligned.rows]] = 0.0
+    return aligned, origin + turn_back(enu_axes(origin), arm_enu), reference
 
 
 def velocity_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
@@ -81,13 +139,12 @@ def velocity_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     """
     known = known_rows(truth, "velocity_enu_m_s", fixed_only=fixed_only)
     aligned = align(solution.valid_time_ns, known.valid_time_ns)
-    if len(aligned.rows) == 0:
+    if len(aligned.rows) == 0 or "velocity_enu_m_s" not in solution.values:
         return _none()
-    rate = solution["angular_rate_body_rad_s"][aligned.rows].astype(np.float64)
-    swing = np.cross(rate, _lever_arms(aligned, known))
-    velocity = solution["velocity_enu_m_s"][aligned.rows].astype(np.float64) + turn(
-        _attitudes(solution, aligned), swing
-    )
+    rate = _optional(solution, "angular_rate_body_rad_s", aligned)
+    swing = turn(_attitudes(solution, aligned), np.cross(rate, _lever_arms(aligned, known)))
+    swing[of_antenna(solution)[aligned.rows]] = 0.0
+    velocity = solution["velocity_enu_m_s"][aligned.rows].astype(np.float64) + swing
     reference = aligned.linear(known["velocity_enu_m_s"].astype(np.float64))
     return _finite(solution, aligned, velocity - reference)
 
@@ -107,7 +164,7 @@ def attitude_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     """
     known = known_rows(truth, "attitude_rad", fixed_only=fixed_only)
     aligned = align(solution.valid_time_ns, known.valid_time_ns)
-    if len(aligned.rows) == 0:
+    if len(aligned.rows) == 0 or "attitude_rad" not in solution.values:
         return _none()
     reference = aligned.angles(known["attitude_rad"].astype(np.float64))
     found = solution["attitude_rad"][aligned.rows].astype(np.float64)
@@ -132,7 +189,7 @@ def rotation_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     """
     known = known_rows(truth, "attitude_rad", fixed_only=fixed_only)
     aligned = align(solution.valid_time_ns, known.valid_time_ns)
-    if len(aligned.rows) == 0:
+    if len(aligned.rows) == 0 or "attitude_rad" not in solution.values:
         return _none()
     reference = body_to_enu(aligned.angles(known["attitude_rad"].astype(np.float64)))
     found = _attitudes(solution, aligned)
@@ -144,8 +201,21 @@ def rotation_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     return _finite(solution, aligned, vectors)
 
 
+def of_antenna(solution: Columns) -> Mask:
+    """Which rows (n,) of a solution have no attitude, so that they are about an antenna."""
+    if "attitude_rad" not in solution.values:
+        return np.ones(len(solution), dtype=np.bool_)
+    return ~solution.is_present("attitude_rad")
+
+
+def _optional(solution: Columns, field: str, aligned: Aligned) -> Floats:
+    if field not in solution.values:
+        return np.full((len(aligned.rows), 3), np.nan)
+    return solution[field][aligned.rows].astype(np.float64)
+
+
 def _attitudes(solution: Columns, aligned: Aligned) -> Floats:
-    return body_to_enu(solution["attitude_rad"][aligned.rows].astype(np.float64))
+    return body_to_enu(_optional(solution, "attitude_rad", aligned))
 
 
 def _lever_arms(aligned: Aligned, truth: Columns) -> Floats:

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from replay.errors import DataError
 from replay.evaluate.align import Rows
 from replay.evaluate.errors_enu import Errors
+from replay.evaluate.status import updated
 from replay.log.columns import Columns
-from replay.schemas import solution_pb2
 from replay.time import NS_PER_S
 
 DEGRADE: Final = "replay.degrade"
@@ -219,8 +219,7 @@ def _drift_row(span: Span, solution: Columns, update_times_ns: Rows) -> tuple[in
     if len(after) == 0:
         row = len(times) - 1
     else:
-        updated = solution["status"] == solution_pb2.SOLUTION_STATUS_UPDATED
-        at_update = np.flatnonzero(updated & (times == after[0]))
+        at_update = np.flatnonzero(updated(solution) & (times == after[0]))
         first = int(at_update[0]) if len(at_update) else int(np.searchsorted(times, after[0]))
         row = first - 1
     if row < 0 or times[row] <= span.start_ns:

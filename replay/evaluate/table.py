@@ -11,6 +11,7 @@ from rich.table import Table
 from replay.evaluate.consistency import Consistency
 from replay.evaluate.outages import Outage
 from replay.evaluate.report import Evaluation
+from replay.evaluate.satellites import Geometry, Spread
 from replay.evaluate.statistics import Statistics
 
 _FIGURES: Final = ("mean", "std", "rms", "p95", "max")
@@ -27,6 +28,12 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     )
     console.print(_error_table("at GNSS epochs outside outages", _at_epochs(evaluation)))
     console.print(_error_table("at all rows", _at_all(evaluation)))
+    if evaluation.solution_of != "imu":
+        console.print(
+            "[dim]position: rows without attitude are about an antenna and are compared as they"
+            " stand, wherever the truth's point is[/dim]"
+        )
+    _print_gnss(evaluation, console)
     if evaluation.outages:
         console.print(_outage_table(evaluation.outages))
         summary = evaluation.outage_summary
@@ -46,6 +53,16 @@ _Group = tuple[str, str, Mapping[str, Statistics] | None]
 def _at_epochs(evaluation: Evaluation) -> tuple[_Group, ...]:
     return (
         ("position", "m", evaluation.position_error_m),
+        (
+            f"position change, {evaluation.counts.change_pairs} pairs",
+            "m",
+            evaluation.position_change_error_m,
+        ),
+        *(
+            [("position, fixed", "m", evaluation.position_error_fixed_m)]
+            if evaluation.position_error_fixed_m is not None
+            else []
+        ),
         ("velocity", "m/s", evaluation.velocity_error_m_s),
         ("attitude", "deg", evaluation.attitude_error_deg),
     )
@@ -67,13 +84,67 @@ def _error_table(where: str, groups: tuple[_Group, ...]) -> Table:
         table.add_column(name, justify="right")
     for name, unit, axes in groups:
         if axes is None:
-            table.add_row(f"{name} [{unit}]".replace("[", r"\["), "no truth")
+            table.add_row(f"{name} [{unit}]".replace("[", r"\["), "not known to both")
             continue
         for index, (axis, figures) in enumerate(axes.items()):
             head = f"{name} [{unit}]".replace("[", r"\[") if index == 0 else ""
             table.add_row(head, axis, *(_number(getattr(figures, key)) for key in _FIGURES))
         table.add_section()
     return table
+
+
+def _print_gnss(evaluation: Evaluation, console: Console) -> None:
+    """Geometry, ambiguities and availability, of which a run over positions has none."""
+    if evaluation.geometry is not None:
+        console.print(_geometry_table(evaluation.geometry))
+    ambiguities = evaluation.ambiguities
+    if ambiguities is not None:
+        shares = ", ".join(f"{100.0 * s:.1f} % {name}" for name, s in ambiguities.share.items())
+        console.print(f"Ambiguities, {ambiguities.epochs} epochs: {shares}")
+        console.print(
+            f"wrong fixes: {_count(ambiguities.wrong_fixes)} of {ambiguities.fixed_with_truth} over"
+            f" {ambiguities.wrong_fix_limit_m:g} m horizontally, at most"
+            f" {_count(ambiguities.longest_wrong_run)} in a row; " + _ratio(ambiguities.ratio)
+        )
+    if evaluation.availability is not None:
+        found = evaluation.availability
+        console.print(
+            f"Availability: a solution at {found.solution_epochs} of {found.observation_epochs}"
+            f" epochs of observation, {100.0 * found.share:.1f} %"
+        )
+
+
+def _ratio(ratio: Spread | None) -> str:
+    if ratio is None:
+        return "no ratios told"
+    return f"ratio median {ratio.median:.2f}, mean {ratio.mean:.2f}, least {ratio.min:.2f}"
+
+
+def _geometry_table(geometry: Geometry) -> Table:
+    table = Table(title=f"Satellites used and PDOP, {geometry.epochs} epochs", title_justify="left")
+    table.add_column("system")
+    for name in ("satellites mean", "least", "most"):
+        table.add_column(name, justify="right")
+    for name in ("PDOP epochs", "mean", "median", "p95", "max"):
+        table.add_column(name, justify="right")
+    for system, counts in geometry.satellites.items():
+        pdop = geometry.pdop.get(system)
+        table.add_row(
+            system,
+            f"{counts.mean:.2f}",
+            f"{counts.min:.0f}",
+            f"{counts.max:.0f}",
+            *([_ABSENT] * 5 if pdop is None else [f"{pdop.count}", *_dops(pdop)]),
+        )
+    return table
+
+
+def _dops(dop: Spread) -> list[str]:
+    return [f"{value:.2f}" for value in (dop.mean, dop.median, dop.p95, dop.max)]
+
+
+def _count(value: int | None) -> str:
+    return _ABSENT if value is None else str(value)
 
 
 def _outage_table(outages: tuple[Outage, ...]) -> Table:
@@ -111,7 +182,8 @@ def _consistency_table(evaluation: Evaluation) -> Table:
     table.add_section()
     for kind, axes in (evaluation.nis or {}).items():
         for axis, of_axis in axes.items():
-            _add_consistency(table, f"NIS {kind.replace('_', ' ')} {axis}", of_axis)
+            side = "" if axis == "none" else f" {axis}"
+            _add_consistency(table, f"NIS {kind.replace('_', ' ')}{side}", of_axis)
     return table
 
 

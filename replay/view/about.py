@@ -41,7 +41,7 @@ def about_markdown(data: RunData, scene: Scene | None) -> str:
     parts = ["# What was run", *_manifest_lines(data), "", "# Reading the views"]
     parts += [
         "- Times are the calendar of GPS time (no leap seconds).",
-        "- White: truth. Orange, yellow, brown: receivers. Blue, green, purple, violet: runs, "
+        "- White: truth. Orange, yellow, brown: receivers. Blue, green, purple and on: runs, "
         "in the order of their names. **Red: outage** or a rejected measurement.",
         "- Bands are three standard deviations to each side.",
         "- Errors are solution minus truth at the truth's point, east, north, up there; truth "

@@ -23,6 +23,9 @@ MOTION: Final = "Attitude & velocity"
 SENSORS: Final = "Sensor errors"
 INNOVATIONS: Final = "Innovations"
 RAW: Final = "Raw"
+SATELLITES: Final = "Satellites"
+AMBIGUITIES: Final = "Ambiguities"
+CORRECTIONS: Final = "Corrections"
 ABOUT: Final = "About"
 
 _MOTION_SECTIONS: Final = (
@@ -34,11 +37,15 @@ _SENSOR_SECTIONS: Final = (
     Section.NON_SLIP,
     Section.SQUAT,
 )  # fmt: skip
+_SATELLITE_SECTIONS: Final = (
+    Section.GEOMETRY, Section.CLOCK, Section.DISPLACEMENT, Section.SLIPS,
+)  # fmt: skip
 Part = rrb.Container | rrb.View
 _MAX_CURVES_IN_LEGEND: Final = 12
 _EQUATOR_M: Final = 40_075_016.7  # 2 pi times the semi-major axis of WGS 84
 _TILE_POINTS: Final = 256
 _MAP_WIDTH, _MAP_HEIGHT = 440.0, 360.0  # points of the view in a window of 1600 by 1000, less a rim
+_LOW_MAP_HEIGHT: Final = 250.0  # where two rows of plots stand below it
 _VIEW_ASPECT: Final = 1.2  # of the plan's view in such a window
 _EYE_HEIGHT: Final = 1.15  # of the plan's height, for the viewer's field of view of 55 degrees
 _SMALLEST_PLAN_M: Final = 20.0
@@ -83,7 +90,10 @@ def make_blueprint(contents: Contents, *, active_tab: str | None = None) -> rrb.
         (OVERVIEW, _overview(contents)),
         (MOTION, _rows(contents, _MOTION_SECTIONS)),
         (SENSORS, _rows(contents, _SENSOR_SECTIONS)),
-        (INNOVATIONS, _rows(contents, (Section.INNOVATIONS, Section.NIS))),
+        (SATELLITES, _rows(contents, _SATELLITE_SECTIONS)),
+        (AMBIGUITIES, _rows(contents, (Section.AMBIGUITIES,))),
+        (INNOVATIONS, _rows(contents, (Section.INNOVATIONS, Section.NIS, Section.RESIDUALS))),
+        (CORRECTIONS, _rows(contents, (Section.CORRECTIONS,))),
         (RAW, _raw(contents)),
         (ABOUT, [rrb.TextDocumentView(origin="/about", name="About this recording")]),
     ]
@@ -117,11 +127,13 @@ def _plot(
     *,
     legend: bool = True,
     corner: rrb.Corner2D = rrb.Corner2D.LeftTop,
+    limits: tuple[float, float] | None = None,
 ) -> rrb.View:
     return rrb.TimeSeriesView(
         origin="/" + entity(path),
         name=heading,
         axis_x=_time_axis(contents),
+        axis_y=None if limits is None else rrb.ScalarAxis(range=limits),
         plot_legend=rrb.PlotLegend(corner, visible=legend),
     )
 
@@ -147,7 +159,14 @@ def _row(contents: Contents, panels: Sequence[Panel]) -> list[Part]:
         settles = panel.section in _SENSOR_SECTIONS
         corner = rrb.Corner2D.RightTop if settles else rrb.Corner2D.LeftTop
         views.append(
-            _plot(contents, f"plots/{panel.key}", panel.heading, legend=legend, corner=corner)
+            _plot(
+                contents,
+                f"plots/{panel.key}",
+                panel.heading,
+                legend=legend,
+                corner=corner,
+                limits=panel.limits,
+            )
         )
     return views
 
@@ -155,8 +174,11 @@ def _row(contents: Contents, panels: Sequence[Panel]) -> list[Part]:
 def _overview(contents: Contents) -> list[Part]:
     parts: list[Part] = []
     if contents.scene is not None:
-        parts.append(rrb.Horizontal(*_scene_views(contents.scene)))
-    parts += _rows(contents, (Section.POSITION_ERROR, Section.POSITION_SIGMA))
+        more = any(p.section is Section.CHANGE_ERROR for p in contents.panels)
+        height = _LOW_MAP_HEIGHT if more else _MAP_HEIGHT
+        parts.append(rrb.Horizontal(*_scene_views(contents.scene, height)))
+    shown = (Section.POSITION_ERROR, Section.POSITION_SIGMA, Section.CHANGE_ERROR)
+    parts += _rows(contents, shown)
     lanes: list[Part] = []
     if contents.has_states:
         lanes.append(
@@ -172,14 +194,23 @@ def _overview(contents: Contents) -> list[Part]:
         )
     if lanes:
         parts.append(rrb.Horizontal(*lanes))
-    return [rrb.Vertical(*parts, row_shares=[5, 3, 2][: len(parts)])] if parts else []
+    return (
+        [rrb.Vertical(*parts, row_shares=_shares(len(parts), contents.run_count))] if parts else []
+    )
 
 
-def _scene_views(scene: Scene) -> list[rrb.View]:
+def _shares(count: int, runs: int) -> list[float]:
+    """Heights of the rows of the overview: plan, plots, lanes (one per run)."""
+    middle = count - 2
+    lanes = 1.1 + 0.55 * runs
+    return [5.0, 3.0, 2.0][:count] if middle <= 1 else [5.0, *[2.6] * middle, max(1.6, lanes)]
+
+
+def _scene_views(scene: Scene, map_height: float) -> list[rrb.View]:
     east, north, _ = np.maximum(scene.high_m - scene.low_m, _SMALLEST_PLAN_M)
     spacing = 10.0 ** np.floor(np.log10(max(east, north) / 2.0))
     views: list[rrb.View] = [
-        rrb.MapView(origin="/map", name="Map", zoom=_map_zoom(east, north, scene)),
+        rrb.MapView(origin="/map", name="Map", zoom=_map_zoom(east, north, scene, map_height)),
         rrb.Spatial3DView(
             origin="/world",
             contents=["$origin/**", *(f"- /{entity(body)}/**" for body in scene.bodies)],
@@ -190,13 +221,13 @@ def _scene_views(scene: Scene) -> list[rrb.View]:
     ]
     if scene.bodies:
         place = "/" + entity(scene.bodies[0])
+        what = "Body axes and position" if scene.has_axes else "Position"
         scale = f" {TIMES}{scene.exaggeration}" if scene.exaggeration > 1 else ""
         views.append(
             rrb.Spatial3DView(
                 origin=place,
                 contents=["/world/**", "- /world/names"],
-                name=f"Body axes and position {ELLIPSOID_SIGMAS:g}{SIGMA} ellipsoid"
-                f"{scale}, moving along",
+                name=f"{what} {ELLIPSOID_SIGMAS:g}{SIGMA} ellipsoid{scale}, moving along",
                 line_grid=rrb.LineGrid3D(visible=True, spacing=1.0),
                 eye_controls=rrb.EyeControls3D(
                     kind=rrb.Eye3DKind.Orbital,
@@ -222,10 +253,10 @@ def plan_eye(low_m: Floats, high_m: Floats) -> rrb.EyeControls3D:
     )
 
 
-def _map_zoom(east_m: float, north_m: float, scene: Scene) -> float:
+def _map_zoom(east_m: float, north_m: float, scene: Scene, height: float) -> float:
     """Zoom level that shows the box (a level has 256 * 2^zoom points around the equator)."""
     around_m = _EQUATOR_M * float(np.cos(np.radians(scene.frame.origin_geodetic[0])))
-    points_per_m = min(_MAP_WIDTH / east_m, _MAP_HEIGHT / north_m)
+    points_per_m = min(_MAP_WIDTH / east_m, height / north_m)
     return float(np.clip(np.log2(around_m * points_per_m / _TILE_POINTS), 0.0, 19.0))
 
 

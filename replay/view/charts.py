@@ -170,7 +170,11 @@ class _Pen:
         if curve.shape is Shape.DOTS:
             stride = dot_stride(count, self.most_dots)
             if stride > 1:
-                self.notes[f"Of the dots of “{curve.label}” 1 in {stride} is drawn."] = None
+                self.notes[
+                    f"Of each satellite at most {self.most_dots} dots are drawn."
+                    if curve.group
+                    else f"Of the dots of “{curve.label}” 1 in {stride} is drawn."
+                ] = None
             return np.arange(0, count, stride, dtype=np.int64)
         band = curve.shape is Shape.BAND
         rows = band_rows(curve.values, self.bins) if band else line_rows(curve.values, self.bins)
@@ -179,6 +183,19 @@ class _Pen:
                 f"Lines keep the first, least, greatest and last row of each of {self.bins} spans."
             ] = None
         return rows
+
+    def note_beyond(self, item: Panel) -> None:
+        """Say how many points a cut axis leaves out of the picture."""
+        if item.limits is None:
+            return
+        low, high = item.limits
+        beyond = sum(
+            int(np.count_nonzero((curve.values < low) | (curve.values > high)))
+            for curve in item.curves
+            if curve.shape is not Shape.BAND
+        )
+        if beyond:
+            self.notes[f"{item.title}: {beyond} points lie beyond the axis."] = None
 
 
 def _draw_panel(ax: Axes, item: Panel, pen: _Pen, outages: Sequence[Span]) -> None:
@@ -198,10 +215,13 @@ def _draw_panel(ax: Axes, item: Panel, pen: _Pen, outages: Sequence[Span]) -> No
     ax.set_xlim(float(clock.elapsed(clock.start_ns)), float(clock.elapsed(clock.end_ns)))
     ax.yaxis.set_major_locator(MaxNLocator(5))
     ax.margins(y=0.06)
+    if item.limits is not None:
+        ax.set_ylim(*item.limits)
+        pen.note_beyond(item)
 
 
 def _draw_curve(ax: Axes, curve: Curve, pen: _Pen) -> None:
-    color, label = curve.ink.hexadecimal, curve.label
+    color, label = curve.ink.hexadecimal, curve.group or curve.label
     rows = pen.rows(curve)
     x, y = pen.clock.elapsed(curve.times_ns[rows]), curve.values[rows]
     if curve.shape is Shape.BAND:
@@ -255,7 +275,9 @@ def _svg(figure: Figure, salt: str) -> str:
 
 def _smaller(svg: str) -> str:
     """The same picture in half the bytes: hundredths of a point, and a dot's style told once."""
-    svg = re.sub(r"(\d\.\d\d)\d+", r"\1", svg)
+    svg = re.sub(  # not between tags, where the numbers of an axis stand
+        r"(>[^<]+<)|(\d\.\d\d)\d+", lambda found: found.group(1) or found.group(2), svg
+    )
     svg = re.sub(r"\s*\nL ", " ", svg)  # pairs after a move are lines anyway
     svg = re.sub(r"\n\s*", "\n", svg)
     run = r'(<use [^>]*?) style="([^"]*)"/>\n(?:<use [^>]*? style="\2"/>\n)+'

@@ -30,6 +30,8 @@ _DEG_H: Final = np.degrees(1.0) * 3600.0
 _MG: Final = 1e3 / STANDARD_GRAVITY_M_S2
 _XYZ: Final = (("_x",), ("_y",), ("_z",))
 NIS_CONFIDENCE: Final = 0.95
+_LEAST_LIMIT: Final = 5.0  # standard deviations
+_ROOM: Final = 1.15
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -159,7 +161,11 @@ def _innovation_panel(
     ]  # fmt: skip
     key = f"innovations/{run}/{words}/{side or 'scalar'}".replace(" ", "_").replace("-", "_")
     row = f"{run}/{words}"
-    return panel(Section.INNOVATIONS, key, title[0].upper() + title[1:], unit, curves, row=row)
+    # Satellites are left out at any size: the axis is that of what was used, and the bound.
+    limit = max(_LEAST_LIMIT, _ROOM * float(np.max(np.abs(values[accepted]), initial=0.0)))
+    limits = (-limit, limit) if shared else None
+    title = title[0].upper() + title[1:]
+    return panel(Section.INNOVATIONS, key, title, unit, curves, row=row, limits=limits)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)

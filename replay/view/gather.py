@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from replay import channels
 from replay.evaluate.outages import Span
+from replay.evaluate.status import updated
 from replay.log.columns import Columns, concatenate
 from replay.view.outages import find_outages
 from replay.view.uncertainty import Sigmas, join_sigmas, sigmas_of
@@ -26,11 +27,23 @@ KEPT = (
     channels.GNSS_FIX,
     channels.GNSS_OBS,
     channels.TRUTH,
+    channels.SATELLITES,
+    channels.CORRECTIONS,
+    channels.GNSS_EVENTS,
+    channels.SLIPS,
+    channels.DISPLACEMENT,
     channels.FILTER_STATE,
     channels.FILTER_INNOVATIONS,
+    channels.FILTER_CLOCKS,
+    channels.FILTER_GEOMETRY,
+    channels.FILTER_AMBIGUITIES,
+    channels.FILTER_RESOLUTION,
     channels.FILTER_EVENTS,
     channels.SOLUTION,
 )
+
+
+_OF_RUNS = (channels.SOLUTION, channels.FILTER_GEOMETRY, channels.FILTER_CLOCKS)
 
 
 @dataclasses.dataclass(slots=True)
@@ -73,6 +86,10 @@ class Run:
     sigmas: Sigmas | None = None
     innovations: Columns | None = None
     events: Columns | None = None
+    clocks: Columns | None = None
+    geometry: Columns | None = None
+    ambiguities: Columns | None = None
+    resolution: Columns | None = None
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +100,8 @@ class RunData:
     ----------
     truth : Columns or None
     fixes, observations : mapping of receiver to Columns
+    satellites, corrections, slips, displacements, gnss_events : mapping of receiver to Columns
+        What stages said of a receiver's satellites.
     runs : tuple of Run
         In the order of their names.
     stats : mapping of topic to ChannelStats
@@ -99,13 +118,27 @@ class RunData:
     stats: Mapping[str, ChannelStats]
     outages: tuple[Span, ...]
     metadata: Mapping[str, Mapping[str, str]]
+    satellites: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    corrections: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    slips: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    displacements: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    gnss_events: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
 
     @property
     def span_ns(self) -> tuple[int, int] | None:
-        """First and last valid time of all channels; None for an empty log."""
+        """First and last valid time to show; None for an empty log.
+
+        Of all channels, but of a run over observations that of the runs: orbits and a base
+        may begin long before.
+        """
         if not self.stats:
             return None
-        values = self.stats.values()
+        over_observations = any(run.geometry is not None for run in self.runs)
+        values = [
+            stats
+            for topic, stats in self.stats.items()
+            if not over_observations or channels.find(topic) in _OF_RUNS
+        ]
         return min(s.first_ns for s in values), max(s.last_ns for s in values)
 
 
@@ -157,11 +190,27 @@ def gather(
         observations=_by_part(whole, channels.GNSS_OBS, "receiver"),
         runs=runs,
         stats={topic: stats[topic] for topic in sorted(stats)},
-        outages=find_outages(
-            metadata, (fix.valid_time_ns for fix in fixes.values()), max(ends, default=None)
-        ),
+        outages=find_outages(metadata, _position_times(fixes, runs), max(ends, default=None)),
         metadata=metadata,
+        satellites=_by_part(whole, channels.SATELLITES, "receiver"),
+        corrections=_by_part(whole, channels.CORRECTIONS, "receiver"),
+        slips=_by_part(whole, channels.SLIPS, "receiver"),
+        displacements=_by_part(whole, channels.DISPLACEMENT, "receiver"),
+        gnss_events=_by_part(whole, channels.GNSS_EVENTS, "receiver"),
     )
+
+
+def _position_times(
+    fixes: Mapping[str, Columns], runs: Iterable[Run]
+) -> list[npt.NDArray[np.int64]]:
+    """Times of positions: those of fixes, else the updated rows of runs over observations."""
+    if fixes:
+        return [fix.valid_time_ns for fix in fixes.values()]
+    return [
+        run.solution.valid_time_ns[updated(run.solution)]
+        for run in runs
+        if run.solution is not None and run.geometry is not None
+    ]
 
 
 def _in_order(columns: Columns) -> Columns:
@@ -180,19 +229,25 @@ def _by_part(
 
 
 def _runs(whole: Mapping[str, Columns], sigmas: Mapping[str, Sigmas]) -> tuple[Run, ...]:
-    solutions = _by_part(whole, channels.SOLUTION, "run")
-    states = _by_part(whole, channels.FILTER_STATE, "run")
-    innovations = _by_part(whole, channels.FILTER_INNOVATIONS, "run")
-    events = _by_part(whole, channels.FILTER_EVENTS, "run")
-    names = sorted({*solutions, *states, *innovations, *events, *sigmas})
+    of = {
+        field: _by_part(whole, spec, "run")
+        for field, spec in (
+            ("solution", channels.SOLUTION),
+            ("state", channels.FILTER_STATE),
+            ("innovations", channels.FILTER_INNOVATIONS),
+            ("events", channels.FILTER_EVENTS),
+            ("clocks", channels.FILTER_CLOCKS),
+            ("geometry", channels.FILTER_GEOMETRY),
+            ("ambiguities", channels.FILTER_AMBIGUITIES),
+            ("resolution", channels.FILTER_RESOLUTION),
+        )
+    }
+    names = sorted({name for found in of.values() for name in found} | set(sigmas))
     return tuple(
         Run(
             name,
-            solutions.get(name),
-            states.get(name),
-            sigmas.get(name),
-            innovations.get(name),
-            events.get(name),
+            sigmas=sigmas.get(name),
+            **{field: found[name] for field, found in of.items() if name in found},
         )
         for name in names
     )

@@ -12,9 +12,9 @@ from replay.log.columns import Columns
 from replay.view.fields import doubles, texts
 from replay.view.frame import geodetic
 from replay.view.gather import RunData
-from replay.view.labels import SIGMA
-from replay.view.palette import TRUTH, Ink, receiver_ink, run_ink
-from replay.view.panels import Curve, Panel, Section, Shape, finite_curve, panel
+from replay.view.labels import SIGMA, system
+from replay.view.palette import TRUTH, Ink, receiver_ink, run_ink, system_ink
+from replay.view.panels import Curve, Panel, Section, Shape, broken, finite_curve, panel
 
 _OPTIONAL: Final = (
     ("satellite_count", "satellites", "Satellites used", "1", "Fixes"),
@@ -119,11 +119,11 @@ def _observation_panels(receiver: str, observations: Columns, ink: Ink) -> list[
     for name in names.tolist():
         first = np.unique(signals[satellites == name])[0]
         rows = (satellites == name) & (signals == first) & known
-        label = f"{name} {first}"
-        key = f"{name}_{first}"
-        curves.append(
-            finite_curve(Curve(key, label, times[rows], strength[rows], run_ink(len(curves))))
-        )
+        line = Curve(
+            f"{name}_{first}", f"{name} {first}", times[rows], strength[rows],
+            system_ink(name[:1]), group=system(name[:1]),
+        )  # fmt: skip
+        curves.append(broken(finite_curve(line)))
     return panels + panel(
         Section.GNSS, f"gnss/{receiver}/cn0",
         f"{receiver}: C/N0, first signal of each satellite", "dB-Hz", curves, row=receiver,

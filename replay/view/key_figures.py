@@ -12,6 +12,8 @@ from replay.view.markup import Table
 _STATISTICS: Final = ("mean", "std", "rms", "p95", "max")
 _ERRORS: Final = (
     ("position_error_m", "Position", "m"),
+    ("position_change_error_m", "Position change", "m"),
+    ("position_error_fixed_m", "Position, fixed", "m"),
     ("velocity_error_m_s", "Velocity", "m/s"),
     ("attitude_error_deg", "Attitude", "deg"),
 )
@@ -38,8 +40,13 @@ _TILES: Final = (
     ("3D 95 %", "position_error_m", "3d", "p95", "m"),
     ("Heading RMS", "attitude_error_deg", "heading", "rms", "deg"),
 )
-_WORDS: Final = {"3d": "3D", "nees": "NEES", "nis": "NIS"}
-_TOLD: Final = {key for key, *_ in _ERRORS + _WITH_OUTAGES} | {"outages", "run", "start_ns"}
+_WORDS: Final = {"3d": "3D", "nees": "NEES", "nis": "NIS", "none": ""}
+_TOLD: Final = {key for key, *_ in _ERRORS + _WITH_OUTAGES} | {
+    "outages", "run", "start_ns", "geometry", "ambiguities", "availability",
+}  # fmt: skip
+_SYSTEMS: Final = {
+    "gps": "GPS", "glonass": "GLONASS", "galileo": "Galileo", "beidou": "BeiDou", "qzss": "QZSS",
+}  # fmt: skip
 
 
 def number(value: Any, decimals: int) -> str:
@@ -61,6 +68,12 @@ def headline(evaluation: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         for outage in _list(evaluation.get("outages"))
         if isinstance(drift := outage.get("horizontal_drift_m"), int | float)
     ]
+    for label, quantity, key in (
+        ("Fixed", "ambiguities", "share"), ("Available", "availability", "share"),
+    ):  # fmt: skip
+        share = _at(evaluation, quantity, key, *(["fixed"] if quantity == "ambiguities" else []))
+        if share is not None:
+            found.append((label, number(100.0 * share, 1), "%"))
     if drifts:
         found.append(("Worst horizontal drift in outages", number(max(drifts), 2), "m"))
     return found
@@ -74,6 +87,8 @@ def tables(evaluation: Mapping[str, Any]) -> list[Table]:
         *_error_table(evaluation, _ERRORS, first),
         *_error_table(evaluation, _WITH_OUTAGES, "error against truth at all rows"),
         *_outage_table(evaluation),
+        *_geometry_table(evaluation),
+        *_ambiguity_table(evaluation),
         *_consistency_table(evaluation),
         *_other_table(evaluation),
     ]
@@ -111,6 +126,56 @@ def _outage_table(evaluation: Mapping[str, Any]) -> list[Table]:
         for i, outage in enumerate(outages, start=1)
     )
     return [Table(("outage, drift at its end", *(label for _, label, _ in columns)), rows)]
+
+
+def _geometry_table(evaluation: Mapping[str, Any]) -> list[Table]:
+    """Satellites used and PDOP by system."""
+    geometry = _mapping(evaluation.get("geometry"))
+    pdops = _mapping(geometry.get("pdop"))
+    rows = tuple(
+        (
+            _SYSTEMS.get(system, system),
+            *(number(counts.get(key), digits) for key, digits in (("mean", 1), ("min", 0))),
+            *(number(_at(pdops, system, key), 2) for key in ("median", "mean", "p95", "max")),
+            _plain(_mapping(pdops.get(system)).get("count")),
+        )
+        for system, counts in _mapping(geometry.get("satellites")).items()
+    )
+    head = (
+        "satellites used, PDOP", "mean", "fewest", "PDOP median", "mean", "95 %", "greatest",
+        "epochs with PDOP",
+    )  # fmt: skip
+    return [Table(head, rows)] if rows else []
+
+
+def _ambiguity_table(evaluation: Mapping[str, Any]) -> list[Table]:
+    """Statuses of epochs, wrong fixes, ratios, availability, as names and values."""
+    found = _mapping(evaluation.get("ambiguities"))
+    rows: list[tuple[str, str]] = [
+        (f"epochs {name} [%]", number(100.0 * float(share), 1))
+        for name, share in _mapping(found.get("share")).items()
+    ]
+    if found:
+        limit = number(found.get("wrong_fix_limit_m"), 2)
+        rows += [
+            ("fixed epochs with truth", _plain(found.get("fixed_with_truth"))),
+            (f"wrong fixes, over {limit} m horizontally", _plain(found.get("wrong_fixes"))),
+            ("most wrong fixes in a row", _plain(found.get("longest_wrong_run"))),
+            ("attempts at integers", _plain(found.get("attempts"))),
+            ("attempts that fixed", _plain(found.get("accepted"))),
+            ("ratio, median", number(_at(found, "ratio", "median"), 2)),
+        ]
+    available = _mapping(evaluation.get("availability"))
+    if available:
+        rows += [
+            ("epochs of observation", _plain(available.get("observation_epochs"))),
+            ("of these with a solution", _plain(available.get("solution_epochs"))),
+        ]
+    return (
+        [Table(("ambiguities and availability" if found else "availability", ""), tuple(rows))]
+        if rows
+        else []
+    )
 
 
 def _consistency_table(evaluation: Mapping[str, Any]) -> list[Table]:

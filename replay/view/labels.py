@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from replay.schemas import filter_pb2, gnss_pb2, solution_pb2
+from replay.schemas import filter_pb2, gnss_pb2, sights_pb2, solution_pb2
 from replay.view.palette import OUTAGE, Ink
 
 SIGMA: Final = "\N{GREEK SMALL LETTER SIGMA}"
@@ -23,6 +23,13 @@ _LEVELS: Final[dict[int, str]] = {
     filter_pb2.EVENT_KIND_OUTAGE_BEGIN: _WARN,
     filter_pb2.EVENT_KIND_IMU_GAP: _WARN,
     filter_pb2.EVENT_KIND_RESET: _WARN,
+    filter_pb2.EVENT_KIND_TOO_FEW_SATELLITES: _WARN,
+    filter_pb2.EVENT_KIND_NOT_CONVERGED: _WARN,
+    filter_pb2.EVENT_KIND_NO_EPHEMERIS: _WARN,
+    filter_pb2.EVENT_KIND_CHAIN_BROKEN: _WARN,
+    filter_pb2.EVENT_KIND_AMBIGUITIES_LOST: _WARN,
+    filter_pb2.EVENT_KIND_CLOCK_JUMP: _WARN,
+    filter_pb2.EVENT_KIND_BASE_LOST: _WARN,
     filter_pb2.EVENT_KIND_TIME_BACKWARD: _ERROR,
     filter_pb2.EVENT_KIND_NOT_FINITE: _CRITICAL,
 }
@@ -42,7 +49,16 @@ STATUS_INKS: Final = {
     "unknown": _GREY,
     "aided": Ink((60, 170, 90), (60, 170, 90)),
     "outage": OUTAGE,
+    "single": QUALITY_INKS["single"],
+    "DGNSS": QUALITY_INKS["DGNSS"],
+    "float": QUALITY_INKS["RTK float"],
+    "fixed": QUALITY_INKS["RTK fixed"],
+    "chained": QUALITY_INKS["fused"],
 }
+SYSTEMS: Final = {
+    "G": "GPS", "R": "GLONASS", "E": "Galileo", "C": "BeiDou", "J": "QZSS", "S": "SBAS",
+    "I": "NavIC",
+}  # fmt: skip
 
 
 def _words(name: str, prefix: str) -> str:
@@ -59,10 +75,21 @@ def quality(number: int) -> str:
 
 def status(number: int) -> str:
     """Word for a SolutionStatus; predicted and updated rows alternate and are both `aided`."""
-    if number == solution_pb2.SOLUTION_STATUS_OUTAGE:
-        return "outage"
-    known = (solution_pb2.SOLUTION_STATUS_PREDICTED, solution_pb2.SOLUTION_STATUS_UPDATED)
-    return "aided" if number in known else "unknown"
+    if number in (solution_pb2.SOLUTION_STATUS_PREDICTED, solution_pb2.SOLUTION_STATUS_UPDATED):
+        return "aided"
+    names = {v.number: v.name for v in solution_pb2.SolutionStatus.DESCRIPTOR.values}
+    return _words(names.get(number, "unknown"), "SOLUTION_STATUS_")
+
+
+def system(letter: str) -> str:
+    """Name of a satellite system by its RINEX letter."""
+    return SYSTEMS.get(letter, letter)
+
+
+def detector(number: int) -> str:
+    """Word for a SlipDetector."""
+    names = {v.number: v.name for v in sights_pb2.SlipDetector.DESCRIPTOR.values}
+    return _words(names.get(number, str(number)), "SLIP_DETECTOR_")
 
 
 def measurement_kind(number: int) -> str:
@@ -84,6 +111,8 @@ def measurement_unit(number: int) -> str:
         filter_pb2.MEASUREMENT_KIND_POSITION: "m",
         filter_pb2.MEASUREMENT_KIND_PSEUDORANGE: "m",
         filter_pb2.MEASUREMENT_KIND_CARRIER_PHASE: "m",
+        filter_pb2.MEASUREMENT_KIND_TIME_DIFFERENCED_PHASE: "m",
+        filter_pb2.MEASUREMENT_KIND_DISPLACEMENT: "m",
         filter_pb2.MEASUREMENT_KIND_VELOCITY: "m/s",
         filter_pb2.MEASUREMENT_KIND_ZERO_VELOCITY: "m/s",
         filter_pb2.MEASUREMENT_KIND_NON_HOLONOMIC: "m/s",

@@ -95,6 +95,9 @@ th { font-weight: 600; border-bottom-color: #b9bec7; vertical-align: bottom; }
 th.n, td.n { text-align: right; }
 td.n { white-space: nowrap; }
 td { overflow-wrap: anywhere; }
+.dense table { font-size: 12.5px; }
+.dense th, .dense td { padding-right: 11px; }
+.dense td:first-child { white-space: nowrap; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px;
   margin: 18px 0; }
 .tiles div { background: var(--tint); border-radius: 8px; padding: 12px 14px; break-inside: avoid; }

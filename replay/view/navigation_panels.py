@@ -7,14 +7,30 @@ from typing import Final
 
 import numpy as np
 
-from replay.evaluate.errors_enu import Errors, attitude_errors, position_errors, velocity_errors
+from replay.evaluate.errors_enu import (
+    Errors,
+    attitude_errors,
+    position_change_errors,
+    position_errors,
+    velocity_errors,
+)
 from replay.evaluate.geometry import Floats, symmetric
+from replay.evaluate.status import updated
 from replay.log.columns import Columns
-from replay.view.fields import doubles
+from replay.view.fields import doubles, optional
 from replay.view.gather import Run, RunData
 from replay.view.labels import ATTITUDE_ANGLES, BOUNDS, LOCAL_AXES, SIGMA
 from replay.view.palette import TRUTH, run_ink
-from replay.view.panels import Curve, Panel, Section, finite_curve, panel, sigma_band
+from replay.view.panels import (
+    Curve,
+    Panel,
+    Section,
+    broken,
+    finite_curve,
+    panel,
+    robust_limits,
+    sigma_band,
+)
 from replay.view.uncertainty import attitude_angle_sigmas
 
 Measure = Callable[[Columns, Columns], Errors]
@@ -29,12 +45,13 @@ def position_sigmas(solution: Columns) -> Floats:
 
 
 def _velocity_sigmas(solution: Columns) -> Floats:
-    return doubles(solution, "velocity_std_enu_m_s")
+    return optional(solution, "velocity_std_enu_m_s", 3)
 
 
 def _attitude_sigmas_deg(solution: Columns) -> Floats:
-    attitude = doubles(solution, "attitude_rad")
-    return np.degrees(attitude_angle_sigmas(attitude, doubles(solution, "attitude_std_rad")))
+    attitude = optional(solution, "attitude_rad", 3)
+    deviations = optional(solution, "attitude_std_rad", 3)
+    return np.degrees(attitude_angle_sigmas(attitude, deviations))
 
 
 def _attitude_errors_deg(solution: Columns, truth: Columns) -> Errors:
@@ -78,10 +95,50 @@ def navigation_panels(data: RunData) -> list[Panel]:
                 for index, run, errors, sigmas in found:
                     curves += _error_curves(run, index, errors, sigmas, axis)
                 title = f"{section.value} {name}, {BOUNDS}"
-                panels += panel(section, f"{key}/{name}", title, unit, curves)
+                limits = _error_limits(found, axis) if section is Section.POSITION_ERROR else None
+                panels += panel(section, f"{key}/{name}", title, unit, curves, limits=limits)
     if not any(p.section is Section.POSITION_ERROR for p in panels):
         panels += _position_sigma_panels(data)
-    return panels + _value_panels(data)
+    return panels + _change_panels(data) + _value_panels(data)
+
+
+def _change_panels(data: RunData) -> list[Panel]:
+    """Errors of the change from epoch to epoch, of runs over observations."""
+    if data.truth is None:
+        return []
+    found = [
+        (index, run, position_change_errors(run.solution, data.truth, updated(run.solution)))
+        for index, run in enumerate(data.runs)
+        if run.solution is not None and run.geometry is not None
+    ]
+    panels: list[Panel] = []
+    for axis, name in enumerate(LOCAL_AXES):
+        curves = [
+            broken(
+                Curve(run.name, run.name, errors.times_ns, errors.values[:, axis], run_ink(index))
+            )
+            for index, run, errors in found
+        ]
+        panels += panel(
+            Section.CHANGE_ERROR,
+            f"position_change_error/{name}",
+            f"{Section.CHANGE_ERROR.value} {name}",
+            "m",
+            curves,
+            limits=robust_limits([curve.values for curve in curves]),
+        )
+    return panels
+
+
+def _error_limits(
+    found: list[tuple[int, Run, Errors, Floats]], axis: int
+) -> tuple[float, float] | None:
+    """Of runs over observations, whose few wild epochs in towns would hide all others."""
+    if any(run.geometry is None for _, run, _, _ in found):
+        return None
+    series = [errors.values[:, axis] for _, _, errors, _ in found]
+    bounds = [3.0 * sigmas[errors.rows, axis] for _, _, errors, sigmas in found]
+    return robust_limits([*series, *bounds, *(-bound for bound in bounds)])
 
 
 def _error_curves(run: Run, index: int, errors: Errors, sigmas: Floats, axis: int) -> list[Curve]:
@@ -103,7 +160,7 @@ def _error_curves(run: Run, index: int, errors: Errors, sigmas: Floats, axis: in
         ink,
         outage_red=True,
     )
-    return [band, error]
+    return [band, broken(error)]
 
 
 def _position_sigma_panels(data: RunData) -> list[Panel]:
@@ -151,7 +208,7 @@ def _value_curves(data: RunData, field: str, axis: int, factor: float) -> list[C
         curves.append(Curve("truth", "truth", known.valid_time_ns, values, TRUTH))
     for index, run in enumerate(data.runs):
         if run.solution is not None:
-            values = doubles(run.solution, field)[:, axis] * factor
+            values = optional(run.solution, field, 3)[:, axis] * factor
             curves.append(
                 Curve(
                     f"run/{run.name}", run.name, run.solution.valid_time_ns, values, run_ink(index)

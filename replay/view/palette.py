@@ -44,6 +44,7 @@ def _mix(color: Rgb, ground: Rgb) -> Rgb:
 
 
 TRUTH: Final = Ink((240, 240, 240), (34, 34, 34))
+ALL_SYSTEMS: Final = Ink((225, 225, 230), (60, 64, 72))
 OUTAGE: Final = Ink((255, 85, 70), (204, 51, 17))
 REJECTED: Final = Ink((255, 60, 60), (200, 20, 20))
 BOUND: Final = Ink((130, 135, 145), (150, 150, 150))
@@ -51,8 +52,20 @@ _RUNS: Final = (
     Ink((86, 180, 255), (0, 98, 178)),  # blue
     Ink((60, 210, 160), (0, 138, 100)),  # bluish green
     Ink((224, 145, 200), (170, 75, 135)),  # reddish purple
+    # From here on hues of receivers too: comparisons, which have many runs, show none.
+    Ink((255, 176, 32), (214, 128, 0)),  # orange
     Ink((190, 165, 255), (100, 75, 190)),  # violet
+    Ink((213, 130, 70), (150, 75, 20)),  # brown
+    Ink((120, 225, 235), (0, 150, 170)),  # cyan
+    Ink((240, 228, 66), (160, 145, 0)),  # yellow
 )
+_SYSTEMS: Final = {
+    "G": Ink((86, 180, 255), (0, 98, 178)),  # blue
+    "R": Ink((255, 140, 120), (190, 70, 50)),  # red-brown
+    "E": Ink((60, 210, 160), (0, 138, 100)),  # bluish green
+    "C": Ink((255, 176, 32), (214, 128, 0)),  # orange
+    "J": Ink((224, 145, 200), (170, 75, 135)),  # reddish purple
+}
 _RECEIVERS: Final = (
     Ink((255, 176, 32), (214, 128, 0)),  # orange
     Ink((240, 228, 66), (160, 145, 0)),  # yellow
@@ -66,8 +79,13 @@ AXES: Final = (
 
 
 def run_ink(index: int) -> Ink:
-    """Colour of the `index`-th run of a log; they repeat after four."""
+    """Colour of the `index`-th run of a log; they repeat after eight."""
     return _RUNS[index % len(_RUNS)]
+
+
+def system_ink(letter: str) -> Ink:
+    """Colour of a satellite system by its RINEX letter; grey for one that is not known."""
+    return _SYSTEMS.get(letter, BOUND)
 
 
 def receiver_ink(index: int) -> Ink:

@@ -8,12 +8,16 @@ from __future__ import annotations
 import dataclasses
 import enum
 from collections.abc import Iterable
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from replay.evaluate.geometry import Floats
 from replay.view.palette import Ink
+
+_GAP_INTERVALS: Final = 3.0
+_GAP_LEAST_NS: Final = 1.5e9
 
 
 class Shape(enum.Enum):
@@ -41,6 +45,14 @@ class Section(enum.Enum):
     MOUNTING = "Mounting angle"
     NON_SLIP = "Non-slip point"
     SQUAT = "Squat"
+    CHANGE_ERROR = "Position change error"
+    GEOMETRY = "Satellites and geometry"
+    CLOCK = "Receiver clock"
+    DISPLACEMENT = "Carrier-phase displacement"
+    AMBIGUITIES = "Ambiguities"
+    RESIDUALS = "Residuals per satellite"
+    SLIPS = "Cycle slips"
+    CORRECTIONS = "Corrections per satellite"
     INNOVATIONS = "Innovations"
     NIS = "Normalised innovation squared"
     GNSS = "GNSS"
@@ -64,6 +76,9 @@ class Curve:
     shape : Shape
     outage_red : bool
         Whether the recording draws its rows in outages again in red.
+    group : str
+        Name in the legend of the page where many curves share one, as those of a system's
+        satellites; empty for the label.
     """
 
     key: str
@@ -73,6 +88,7 @@ class Curve:
     ink: Ink
     shape: Shape = Shape.LINE
     outage_red: bool = False
+    group: str = ""
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +107,8 @@ class Panel:
     unit : str
     curves : tuple of Curve
         From back to front; none is empty.
+    limits : (float, float) or None
+        Of the y axis, where rare great values would hide the rest; None for what fits.
     """
 
     section: Section
@@ -99,6 +117,7 @@ class Panel:
     title: str
     unit: str
     curves: tuple[Curve, ...]
+    limits: tuple[float, float] | None = None
 
     @property
     def heading(self) -> str:
@@ -107,11 +126,60 @@ class Panel:
 
 
 def panel(
-    section: Section, key: str, title: str, unit: str, curves: Iterable[Curve], *, row: str = ""
+    section: Section,
+    key: str,
+    title: str,
+    unit: str,
+    curves: Iterable[Curve],
+    *,
+    row: str = "",
+    limits: tuple[float, float] | None = None,
 ) -> list[Panel]:
     """A list of one panel of the curves that have rows; an empty list where none has."""
     kept = tuple(curve for curve in curves if len(curve.times_ns))
-    return [Panel(section, row or section.value, key, title, unit, kept)] if kept else []
+    return [Panel(section, row or section.value, key, title, unit, kept, limits)] if kept else []
+
+
+def broken(curve: Curve) -> Curve:
+    """The line with a row that is not a number in each gap, so that it does not run across.
+
+    A gap is longer than three median intervals and than a second and a half.
+    """
+    steps = np.diff(curve.times_ns)
+    if len(steps) == 0:
+        return curve
+    limit = max(_GAP_INTERVALS * float(np.median(steps)), _GAP_LEAST_NS)
+    after = np.flatnonzero(steps > limit) + 1
+    if len(after) == 0:
+        return curve
+    middle = curve.times_ns[after - 1] + steps[after - 1] // 2
+    return dataclasses.replace(
+        curve,
+        times_ns=np.insert(curve.times_ns, after, middle),
+        values=np.insert(curve.values, after, np.nan, axis=0),
+    )
+
+
+def robust_limits(
+    series: Iterable[Floats], *, share: float = 99.5, from_nought: bool = False
+) -> tuple[float, float] | None:
+    """Limits of a y axis that hold the given percentage of each series, and some room.
+
+    None where there is nothing to limit: no value lies further out than the limits are apart.
+    """
+    known = [values[np.isfinite(values)] for values in series]
+    known = [values for values in known if len(values)]
+    if not known:
+        return None
+    low = min(float(np.percentile(values, 100.0 - share)) for values in known)
+    high = max(float(np.percentile(values, share)) for values in known)
+    low = 0.0 if from_nought else low
+    room = 0.25 * max(high - low, 1e-9)
+    least = min(float(values.min()) for values in known)
+    most = max(float(values.max()) for values in known)
+    if most <= high + 4.0 * room and least >= low - 4.0 * room:
+        return None
+    return (low if from_nought else low - room, high + room)
 
 
 def finite_curve(curve: Curve) -> Curve:

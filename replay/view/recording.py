@@ -23,10 +23,12 @@ from replay.view.events import events_of
 from replay.view.fields import doubles
 from replay.view.filter_panels import innovation_panels, sensor_panels
 from replay.view.gather import Batches, RunData, gather
+from replay.view.geometry_panels import geometry_panels
 from replay.view.gnss_panels import gnss_panels
 from replay.view.navigation_panels import navigation_panels
 from replay.view.palette import AXES
 from replay.view.panels import Panel
+from replay.view.satellite_panels import satellite_panels
 from replay.view.scene import Scene, draw_scene
 from replay.view.sink import Sink, Times, rgba
 from replay.view.source import open_run
@@ -96,7 +98,7 @@ def record(
 ) -> None:
     """Draw batches of columns into a `.rrd` file; see :func:`write_recording`."""
     chosen = options or RecordingOptions()
-    with _recording_file(out_rrd, name, metadata) as sink:
+    with recording_file(out_rrd, name, metadata) as sink:
         imu = _ImuPlots(sink) if chosen.imu else None
         data = gather(batches, metadata, on_imu=imu)
         scene = draw_scene(
@@ -125,13 +127,15 @@ def all_panels(data: RunData) -> list[Panel]:
     return [
         *navigation_panels(data),
         *sensor_panels(data),
+        *geometry_panels(data),
         *innovation_panels(data),
+        *satellite_panels(data),
         *gnss_panels(data),
     ]
 
 
 @contextlib.contextmanager
-def _recording_file(
+def recording_file(
     out_rrd: Path, name: str, metadata: Mapping[str, Mapping[str, str]]
 ) -> Iterator[Sink]:
     """A sink into a file that takes its name only when it is whole."""
@@ -201,7 +205,9 @@ def _draw_events(sink: Sink, data: RunData) -> bool:
     for run in with_events:
         assert run.events is not None
         _draw_run_events(sink, run.name, run.events)
-    return bool(with_events)
+    for receiver, events in data.gnss_events.items():
+        _draw_run_events(sink, f"gnss/{receiver}", events)
+    return bool(with_events or data.gnss_events)
 
 
 def _draw_run_events(sink: Sink, name: str, columns: Columns) -> None:

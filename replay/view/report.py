@@ -6,20 +6,19 @@ evaluation give the same bytes.
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any, Final
 
-from replay.errors import ReplayError
 from replay.schemas import replay_pb2
 from replay.time import seconds_between, to_text
 from replay.view import key_figures
 from replay.view.about import manifest_of
 from replay.view.charts import Clock, panels_chart
 from replay.view.events import Event, events_of
+from replay.view.files import write_page
 from replay.view.gather import Batches, RunData, gather
 from replay.view.histogram_chart import histogram_chart
 from replay.view.imu_envelope import ImuEnvelope
@@ -28,12 +27,15 @@ from replay.view.markup import Table, figure, page, section, tiles
 from replay.view.panels import Panel, Section
 from replay.view.plan_chart import plan_chart
 from replay.view.recording import all_panels
+from replay.view.sky_chart import sky_chart, tracking_chart
 from replay.view.source import open_run
 
 _MOST_EVENTS: Final = 200
+_BASE: Final = "base"
 _STACKED: Final = {
     Section.POSITION_ERROR: f"Solution minus truth at the truth's point, with {BOUNDS}.",
     Section.POSITION_SIGMA: "There is no truth: the standard deviations that the filter states.",
+    Section.CHANGE_ERROR: "Change of position from epoch to epoch, solution minus truth.",
     Section.VELOCITY_ERROR: f"Solution minus truth, with {BOUNDS} of the solution.",
     Section.ATTITUDE_ERROR: f"Solution minus truth, wrapped, with {BOUNDS} of the solution.",
 }
@@ -57,9 +59,36 @@ _GROUPS: Final = (
         f"Estimates with {BOUNDS} of the filter, in body axes.",
     ),
     (
+        "Satellites and geometry",
+        (Section.GEOMETRY,),
+        "Satellites that the solution rests on, and dilution of precision.",
+    ),
+    (
+        "Receiver clock",
+        (Section.CLOCK,),
+        "Receiver time less system time, as a length; the other systems against the first.",
+    ),
+    (
+        "Carrier-phase displacement",
+        (Section.DISPLACEMENT,),
+        "Change of the antenna's position between epochs from carrier phases.",
+    ),
+    ("Ambiguities", (Section.AMBIGUITIES,), "Integer ambiguities, epoch by epoch."),
+    (
         "Innovations",
         (Section.INNOVATIONS,),
         f"Measurement minus prediction, with {BOUNDS}; crosses were rejected.",
+    ),
+    (
+        "Residuals per satellite",
+        (Section.RESIDUALS,),
+        "Measurement minus prediction of every measurement that was used.",
+    ),
+    ("Cycle slips", (Section.SLIPS,), "Breaks of carrier phases, by what found them."),
+    (
+        "Corrections per satellite",
+        (Section.CORRECTIONS,),
+        "Terms between range and pseudorange, as they add to the pseudorange.",
     ),
     ("GNSS", (Section.GNSS,), "What the receivers state."),
     ("Inertial samples", (Section.IMU,), "Least and greatest sample of each second."),
@@ -99,16 +128,7 @@ def write_report(
             evaluation=evaluation,
             title=title or run_log.stem,
         )
-    part = out_html.with_name(out_html.name + ".part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, out_html)
-    except OSError as error:
-        raise ReplayError(
-            f"the report cannot be written: {error.strerror or error}",
-            where=str(out_html),
-            mend="choose a folder that exists and has room",
-        ) from error
+    write_page(out_html, text)
 
 
 def report_html(
@@ -121,7 +141,7 @@ def report_html(
     """The report as text; see :func:`write_report`."""
     envelope = ImuEnvelope()
     data = gather(batches, metadata, on_imu=envelope)
-    panels = [*all_panels(data), *envelope.panels()]
+    panels = [*_shown(data, all_panels(data)), *envelope.panels()]
     manifest = manifest_of(metadata)
     parts = [
         _header(data, manifest, title),
@@ -194,6 +214,8 @@ def _panel_sections(data: RunData, panels: Sequence[Panel]) -> list[str]:
         figures = [_panels_figure(data, chosen, clock, about, None)]
         if title == "Innovations":
             figures += _consistency_figures(data, panels, clock)
+        if title == "Satellites and geometry":
+            figures += _sky_figures(data, clock)
         parts.append(section(title, figures))
     return parts
 
@@ -218,12 +240,40 @@ def _consistency_figures(data: RunData, panels: Sequence[Panel], clock: Clock) -
     ]
 
 
+def _users(data: RunData) -> list[str]:
+    """Receivers whose satellites are shown: of a base only where there is no other."""
+    names = list(data.satellites)
+    return [name for name in names if name != _BASE] or names
+
+
+def _shown(data: RunData, panels: Sequence[Panel]) -> list[Panel]:
+    """Panels but those of a base's corrections, which are in the recording."""
+    if all(name == _BASE for name in data.corrections):
+        return list(panels)
+    return [panel for panel in panels if not panel.key.startswith(f"corrections/{_BASE}/")]
+
+
+def _sky_figures(data: RunData, clock: Clock) -> list[str]:
+    figures: list[str] = []
+    for receiver in _users(data):
+        satellites = data.satellites[receiver]
+        sky = sky_chart(receiver, satellites)
+        if sky is not None:
+            figures.append(figure(sky, f"Sky plot of {receiver}"))
+        tracking = tracking_chart(receiver, satellites, data.slips.get(receiver), clock)
+        if tracking is not None:
+            figures.append(figure(tracking, f"Satellites of {receiver} along time"))
+    return figures
+
+
 def _events_section(data: RunData) -> str:
+    sources = [(run.name, run.events) for run in data.runs]
+    sources += [(f"GNSS {receiver}", events) for receiver, events in data.gnss_events.items()]
     found: list[tuple[Event, str]] = [
-        (event, run.name)
-        for run in data.runs
-        if run.events is not None
-        for event in events_of(run.events)
+        (event, name)
+        for name, columns in sources
+        if columns is not None
+        for event in events_of(columns)
     ]
     found.sort(key=lambda item: item[0].time_ns)
     rows = tuple(

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns
-from replay.view.fields import doubles
+from replay.view.fields import doubles, optional
 from replay.view.frame import LocalFrame, geodetic
 from replay.view.gather import RunData
 from replay.view.outages import inside
@@ -51,6 +51,8 @@ class Scene:
         Every how manieth point the paths have.
     left_out : int
         Rows whose position is not finite.
+    has_axes : bool
+        Whether any run has an attitude.
     """
 
     frame: LocalFrame
@@ -60,6 +62,7 @@ class Scene:
     exaggeration: int
     path_stride: int
     left_out: int
+    has_axes: bool = True
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +79,12 @@ class _Track:
 
 
 def draw_scene(
-    sink: Sink, data: RunData, *, exaggeration: int | None, max_path_points: int
+    sink: Sink,
+    data: RunData,
+    *,
+    exaggeration: int | None,
+    max_path_points: int,
+    bodies: bool = True,
 ) -> Scene | None:
     """Send map and world.
 
@@ -88,6 +96,8 @@ def draw_scene(
         Of the ellipsoids; None takes the power of ten that makes them seen.
     max_path_points : int
         A path of more points is thinned, and its name says so.
+    bodies : bool
+        Whether each run gets body axes and an ellipsoid that move along.
 
     Returns
     -------
@@ -102,7 +112,7 @@ def draw_scene(
     stride = -(-longest // max_path_points)
     scale = exaggeration or _seen_exaggeration(tracks)
     sink.static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    bodies: list[str] = []
+    places: list[str] = []
     corners: list[Floats] = []
     for track in tracks:
         enu = frame.enu(track.ecef_m)
@@ -112,17 +122,22 @@ def draw_scene(
         else:
             _draw_path(sink, track, enu, data, stride)
         _draw_now(sink, track, enu)
-        if track.is_run:
-            bodies.append(_draw_body(sink, track, enu, frame, scale))
+        if track.is_run and bodies:
+            places.append(_draw_body(sink, track, enu, frame, scale))
     _draw_legend(sink, tracks, frame)
     return Scene(
         frame,
         np.min(corners, axis=0),
         np.max(corners, axis=0),
-        tuple(bodies),
+        tuple(places),
         scale,
         stride,
         left_out,
+        any(
+            np.isfinite(optional(track.columns, "attitude_rad", 3)).any()
+            for track in tracks
+            if track.is_run
+        ),
     )
 
 
@@ -218,17 +233,21 @@ def _draw_body(sink: Sink, track: _Track, enu: Floats, frame: LocalFrame, exagge
     The place has no rotation: a view with its origin there moves along with north ahead.
     """
     times = track.columns.valid_time_ns
-    attitude = doubles(track.columns, "attitude_rad")
+    attitude = optional(track.columns, "attitude_rad", 3)
     turn = frame.attitude_matrices(attitude, track.ecef_m)
     known = np.isfinite(attitude).all(axis=1)
     quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1))
-    quaternions[known] = Rotation.from_matrix(turn[known]).as_quat()
+    if known.any():
+        quaternions[known] = Rotation.from_matrix(turn[known]).as_quat()
     place = f"world/{track.key}/place"
     sink.columns(place, times, lambda rows: rr.Transform3D.columns(translation=enu[rows]))
-    sink.columns(
-        f"{place}/body", times, lambda rows: rr.Transform3D.columns(quaternion=quaternions[rows])
-    )
-    sink.static(f"{place}/body", rr.TransformAxes3D(AXIS_LENGTH_M))
+    if known.any():  # an antenna has no axes
+        sink.columns(
+            f"{place}/body",
+            times,
+            lambda rows: rr.Transform3D.columns(quaternion=quaternions[rows]),
+        )
+        sink.static(f"{place}/body", rr.TransformAxes3D(AXIS_LENGTH_M))
     _draw_ellipsoids(sink, track, f"{place}/{ellipsoid_name(exaggeration)}", frame, exaggeration)
     return place
 

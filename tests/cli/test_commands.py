@@ -160,7 +160,7 @@ def test_run_and_resume(replay: Command, short_log: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("words", "what", "mend"),
     [
-        (["gnss-ins-cl"], "no pipeline 'gnss-ins-cl'", "did you mean gnss-ins-lc"),
+        (["gnss-ins-lcc"], "no pipeline 'gnss-ins-lcc'", "did you mean gnss-ins-lc"),
         ([PIPELINE, "--set", "filter.stattes=15"], "unknown key filter.stattes", "filter.states"),
         ([PIPELINE, "--set", "filter"], "'filter' is no assignment", "section.key=value"),
         ([PIPELINE, "--set", "filter.states=17"], "filter.states is 17", "15"),
@@ -334,6 +334,30 @@ def test_evaluate(replay: Command, short_run: Path, short_log: Path) -> None:
     assert json.loads(figures.out)
     complaint(replay("evaluate", short_log), 1)
     complaint(replay("evaluate", short_run, "--run", "nobody"), 1)
+
+
+def test_compare(replay: Command, short_run: Path, short_log: Path, tmp_path: Path) -> None:
+    page, recording = tmp_path / "methods.html", tmp_path / "methods.rrd"
+    answer = replay("compare", short_run, short_run, "-o", page, "--rrd", recording)
+    assert answer.code == 0, answer.err
+    assert f"{short_run.stem}:{PIPELINE}" in answer.out
+    assert "<h1>Comparison of methods</h1>" in page.read_text()
+    assert recording.read_bytes()[:3] == b"RRF"
+    figures = json.loads(replay("compare", short_run, "--json").out)
+    assert [m["name"] for m in figures["methods"]] == [PIPELINE]
+    alone = json.loads(replay("evaluate", short_run, "--json").out)
+    assert figures["methods"][0]["position_error_m"] == alone["position_error_m"]
+    assert replay("compare", short_run, "--markdown").out.startswith("| method |")
+    scenes = replay(
+        "compare", short_run, "-o", page, "--scene", "5,9", "--scene", "12,20", "--title", "A <b>"
+    )
+    assert scenes.code == 0, scenes.err
+    assert "2 Scene, " in page.read_text() and "A &lt;b&gt;" in page.read_text()
+    complaint(replay("compare", short_log), 1)
+    complaint(replay("compare", short_run, "--scene", "5", "-o", page), 2, mend="START,END")
+    complaint(replay("compare", short_run, "--scene", "9,5", "-o", page), 2)
+    complaint(replay("compare", short_run, "--scene", "a,b", "-o", page), 2)
+    complaint(replay("compare", short_run, "--png", tmp_path / "x.png"), 2, mend="--rrd")
 
 
 def test_view(replay: Command, short_run: Path, tmp_path: Path) -> None:
