@@ -142,7 +142,11 @@ def degrade(
     log: Annotated[Path, typer.Argument(help="Log to change.")],
     output: Output,
     outage: Annotated[
-        list[str], typer.Option(help="T0,DT: from T0 for DT seconds no GNSS; may be repeated.")
+        list[str],
+        typer.Option(
+            help="T0,DT: from T0 for DT seconds no GNSS; with ,keep=3 the three best satellites "
+            "stay, with ,keep=G05+G12 these. May be repeated."
+        ),
     ],
     every: Annotated[
         float, typer.Option(help="Repeat each outage every so many seconds; 0 for once.")
@@ -151,7 +155,7 @@ def degrade(
         float, typer.Option(help="With --every: seconds at the end that stay whole.")
     ] = 30.0,
 ) -> None:
-    """Write a log without GNSS for some stretches of time."""
+    """Write a log without GNSS, or with few satellites, for some stretches of time."""
     from replay.engine.degrade import plan_outages, remove_fixes
 
     outages = plan_outages(log, outage, every_s=every, leave_last_s=leave_last)
@@ -174,8 +178,12 @@ def simulate(
 
 
 @app.command()
-def warmup() -> None:
-    """Compile every kernel now, so that the next command starts fast."""
+def warmup(
+    pipelines: Annotated[
+        list[str] | None, typer.Argument(help="Pipelines that are wanted; all where none is named.")
+    ] = None,
+) -> None:
+    """Compile kernels now, so that the next command starts fast."""
     from replay.engine.warmup import compile_kernels
 
-    say(f"compiled kernels in {compile_kernels():.1f} s")
+    say(f"compiled kernels in {compile_kernels(pipelines or []):.1f} s")
