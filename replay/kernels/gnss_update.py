@@ -96,6 +96,8 @@ def velocity_update(
     r, v, C, lever = nav["r"], nav["v"], nav["C"], fix["lever"]
     w = work["w"]
     window = cfg["velocity_window"]
+    if fix["window"] > 0.0:
+        window = fix["window"]
     span = (t - s["moved_t"]) * 1e-9
     if window > 0.0 and (s["moved_t"] < 0 or abs(span - window) > _WINDOW_SLACK * window):
         return False

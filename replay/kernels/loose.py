@@ -35,7 +35,7 @@ from replay.kernels.records import (
     STATUS_PREDICTED,
     STATUS_UPDATED,
 )
-from replay.kernels.tdcp_link import begin_chain, use_link
+from replay.kernels.tdcp_link import begin_chain, ready_to_align, use_link
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event
 
@@ -161,7 +161,9 @@ def _take_fixes(
         if s["mode"] != RUNNING:
             if fix["t"] < s["imu_t"]:
                 early += 1
-            elif align_fix(s, cfg, work, fix, log_t, events, counts):
+            elif (fix["chain"] == 0 or ready_to_align(s, fix)) and align_fix(
+                s, cfg, work, fix, log_t, events, counts
+            ):
                 s["fix_t"] = fix["t"]
                 mark_epoch(s, fix)
                 if fix["chain"] > 0:

@@ -149,6 +149,8 @@ def state_dtype(states: int) -> "np.dtype[np.void]":
             # chain of displacements
             ("chain_t", "<i8"),  # ns of its last epoch
             ("chain_sum", "<f8", 3),  # m, ECEF, since the place in `aux`
+            ("chain_v", "<f8", 3),  # m/s, ECEF: mean before its last epoch, while aligning
+            ("chain_span", "<f8"),  # s of that mean; 0 where there is none
         ],
         align=True,
     )
