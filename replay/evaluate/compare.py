@@ -105,14 +105,22 @@ def make_method(
     )
     spans = [outages.Span(o.start_ns, o.end_ns) for o in evaluation.outages]
     epochs = updated(solution) & ~outages.inside(solution.valid_time_ns, spans)
-    position = position_errors(solution, data.truth, fixed_only=fixed_truth_only)
+    position = position_errors(
+        solution, data.truth, fixed_only=fixed_truth_only, antenna_arm_m=data.antenna_arm_m
+    )
     return Method(
         name=name,
         log=log,
         data=data,
         evaluation=evaluation,
         position=position.take(epochs[position.rows]),
-        change=position_change_errors(solution, data.truth, epochs, fixed_only=fixed_truth_only),
+        change=position_change_errors(
+            solution,
+            data.truth,
+            epochs,
+            fixed_only=fixed_truth_only,
+            antenna_arm_m=data.antenna_arm_m,
+        ),
     )
 
 

@@ -2,8 +2,9 @@
 
 A solution is about the IMU's origin, truth about a point at its own lever arm. The
 solution is moved there with its own attitude and turn rate, because that is what its
-user would do. A row that has no attitude is about an antenna and is compared as it
-stands: how far the antenna is from the truth's point cannot be known.
+user would do. A row that has no attitude is about an antenna: where the antenna's lever
+arm and the truth's attitude are known, truth is moved there; else the row is compared as
+it stands.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from replay.evaluate.align import Aligned, Rows, align, known_rows, truth_positions
 from replay.evaluate.geometry import Floats, body_to_enu, enu_axes, turn, turn_back, wrapped
 from replay.log.columns import Columns
+from replay.schemas import solution_pb2
 
 Mask = npt.NDArray[np.bool_]
 
@@ -50,7 +52,13 @@ class Errors:
         return Errors(self.rows[keep], self.times_ns[keep], self.values[keep])
 
 
-def position_errors(solution: Columns, truth: Columns, *, fixed_only: bool = False) -> Errors:
+def position_errors(
+    solution: Columns,
+    truth: Columns,
+    *,
+    fixed_only: bool = False,
+    antenna_arm_m: Floats | None = None,
+) -> Errors:
     """Position errors at the truth's point.
 
     Parameters
@@ -59,18 +67,25 @@ def position_errors(solution: Columns, truth: Columns, *, fixed_only: bool = Fal
     truth : Columns of replay.Truth
     fixed_only : bool
         Use rows of truth with fixed ambiguities only.
+    antenna_arm_m : float64 array (3,), optional
+        Body, IMU to the antenna that rows without attitude are about.
 
     Returns
     -------
     Errors
         East, north, up [m].
     """
-    aligned, point, reference = _points(solution, truth, fixed_only=fixed_only)
+    aligned, point, reference = _points(solution, truth, fixed_only, antenna_arm_m)
     return _finite(solution, aligned, turn(enu_axes(reference), point - reference))
 
 
 def position_change_errors(
-    solution: Columns, truth: Columns, epochs: Mask, *, fixed_only: bool = False
+    solution: Columns,
+    truth: Columns,
+    epochs: Mask,
+    *,
+    fixed_only: bool = False,
+    antenna_arm_m: Floats | None = None,
 ) -> Errors:
     """Errors of the change of position from each epoch to the next.
 
@@ -79,11 +94,12 @@ def position_change_errors(
 
     Parameters
     ----------
-    solution, truth, fixed_only
+    solution, truth, fixed_only, antenna_arm_m
         As in :func:`position_errors`; rows of the solution in the order of time.
     epochs : bool array (n,)
         Rows of the solution that are epochs. Only those count as consecutive that are at
-        most 1.5 median intervals of them apart and both have truth.
+        most 1.5 median intervals of them apart and both have truth. Where a solution is
+        chained from epoch to epoch, the epochs at which a chain begins are no change.
 
     Returns
     -------
@@ -96,7 +112,7 @@ def position_change_errors(
     times = solution.valid_time_ns[rows]
     last = np.append(np.diff(times) > 0, True)  # of one time the last row is the epoch's
     rows, times = rows[last], times[last]
-    aligned, point, reference = _points(solution, truth, fixed_only=fixed_only)
+    aligned, point, reference = _points(solution, truth, fixed_only, antenna_arm_m)
     errors = np.full((len(solution), 3), np.nan)
     errors[aligned.rows] = point - reference
     places = np.full((len(solution), 3), np.nan)
@@ -107,20 +123,32 @@ def position_change_errors(
     change = errors[rows[1:]] - errors[rows[:-1]]
     keep = steps <= LONGEST_STEP * float(np.median(steps))
     keep &= np.isfinite(change).all(axis=1)
+    chained = solution["status"] == solution_pb2.SOLUTION_STATUS_CHAINED
+    if chained.any():
+        keep &= chained[rows[1:]]
     later = rows[1:][keep]
     return Errors(later, solution.valid_time_ns[later], turn(enu_axes(places[later]), change[keep]))
 
 
 def _points(
-    solution: Columns, truth: Columns, *, fixed_only: bool
+    solution: Columns, truth: Columns, fixed_only: bool, antenna_arm_m: Floats | None
 ) -> tuple[Aligned, Floats, Floats]:
-    """The solution at the truth's point, and truth, ECEF (m, 3) [m], where truth is known."""
+    """The solution at the truth's point, and truth, ECEF (m, 3) [m], where truth is known.
+
+    Truth of an antenna's rows is that of the antenna where it can be had.
+    """
     known = known_rows(truth, "position_ecef_m", fixed_only=fixed_only)
     aligned = align(solution.valid_time_ns, known.valid_time_ns)
     reference = truth_positions(aligned, known)
     origin = solution["position_ecef_m"][aligned.rows].astype(np.float64)
     arm_enu = turn(_attitudes(solution, aligned), _lever_arms(aligned, known))
-    arm_enu[of_antenna(solution)[aligned.rows]] = 0.0
+    antenna = of_antenna(solution)[aligned.rows]
+    arm_enu[antenna] = 0.0
+    if antenna_arm_m is not None and "attitude_rad" in known.values and antenna.any():
+        turned = body_to_enu(aligned.angles(known["attitude_rad"].astype(np.float64)))
+        away = turn(turned, antenna_arm_m - _lever_arms(aligned, known))
+        away[~(antenna & np.isfinite(away).all(axis=1))] = 0.0
+        reference = reference + turn_back(enu_axes(reference), away)
     return aligned, origin + turn_back(enu_axes(origin), arm_enu), reference
 
 

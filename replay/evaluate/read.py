@@ -14,6 +14,7 @@ import numpy as np
 from replay import channels
 from replay.errors import MissingChannelError, UsageError
 from replay.evaluate.align import Rows
+from replay.evaluate.geometry import Floats
 from replay.log.columns import Columns, concatenate
 from replay.log.reader import LogReader
 
@@ -35,6 +36,8 @@ class RunChannels:
         None where the log does not have them.
     observations_ns : int64 array (n,) or None, GPS ns
         Epochs of observation of the run's receiver, ascending.
+    antenna_arm_m : float64 array (3,) or None
+        Body, IMU to antenna, as the run's configuration has it.
     metadata : mapping of record name to mapping
         Of the log.
     """
@@ -47,6 +50,7 @@ class RunChannels:
     geometry: Columns | None = None
     resolution: Columns | None = None
     observations_ns: Rows | None = None
+    antenna_arm_m: Floats | None = None
     metadata: Metadata = dataclasses.field(default_factory=dict)
 
 
@@ -93,6 +97,7 @@ def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
             geometry=optional(channels.FILTER_GEOMETRY),
             resolution=optional(channels.FILTER_RESOLUTION),
             observations_ns=_observation_times(reader, topics),
+            antenna_arm_m=_antenna_arm(reader.metadata),
             metadata={key: dict(values) for key, values in reader.metadata.items()},
         )
 
@@ -142,6 +147,15 @@ def _manifest(metadata: Metadata) -> tuple[Mapping[str, object], Mapping[str, ob
         return manifest, tomllib.loads(str(manifest.get("configuration", "")))
     except (ValueError, AttributeError):
         return {}, {}
+
+
+def _antenna_arm(metadata: Metadata) -> Floats | None:
+    """Lever arm of the antenna, where the configuration has one that is not zero."""
+    section = _manifest(metadata)[1].get("antenna")
+    arm = section.get("lever_arm") if isinstance(section, Mapping) else None
+    if not isinstance(arm, list) or len(arm) != 3 or not any(arm):
+        return None
+    return np.array(arm, dtype=np.float64)
 
 
 def _observation_times(reader: LogReader, topics: list[str]) -> Rows | None:

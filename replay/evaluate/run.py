@@ -91,7 +91,9 @@ def evaluate_channels(
             )
     # Rows of one time keep their order: the row before an update stands before it.
     solution = data.solution.take(np.argsort(data.solution.valid_time_ns, kind="stable"))
-    position = position_errors(solution, data.truth, fixed_only=fixed_truth_only)
+    position = position_errors(
+        solution, data.truth, fixed_only=fixed_truth_only, antenna_arm_m=data.antenna_arm_m
+    )
     velocity = velocity_errors(solution, data.truth, fixed_only=fixed_truth_only)
     attitude = attitude_errors(solution, data.truth, fixed_only=fixed_truth_only)
     rotation = rotation_errors(solution, data.truth, fixed_only=fixed_truth_only)
@@ -102,7 +104,9 @@ def evaluate_channels(
     spans = tuple(span for span in spans if span.end_ns > solution.valid_time_ns[0])
     measured = tuple(outages.measure(s, solution, updates, position, attitude) for s in spans)
     epoch = updated(solution) & ~outages.inside(solution.valid_time_ns, spans)
-    change = position_change_errors(solution, data.truth, epoch, fixed_only=fixed_truth_only)
+    change = position_change_errors(
+        solution, data.truth, epoch, fixed_only=fixed_truth_only, antenna_arm_m=data.antenna_arm_m
+    )
 
     def at_epochs(errors: Errors) -> Errors:
         return errors.take(epoch[errors.rows])

@@ -60,6 +60,21 @@ def test_an_antenna_is_compared_as_it_stands(whole):
     assert found.position_error_fixed_m is None
 
 
+def test_truth_is_moved_to_a_known_antenna():
+    """With a lever arm of the antenna and attitude of truth no distance is left over."""
+    arm, lever = np.array([-0.4, 0.15, -1.2]), (1.0, 0.4, -0.8)
+    attitude = np.column_stack([0.02 * np.sin(T), 0.05 * np.cos(T), 0.2 * T])
+    solution = antenna_rows(moved(STILL, attitude, arm))
+    truth = truth_rows(T, moved(STILL, attitude, lever), lever=lever, attitude=attitude)
+    found = position_errors(solution, truth, antenna_arm_m=arm)
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-6)
+    left = position_errors(solution, truth)
+    assert np.linalg.norm(left.values, axis=1).min() > 1.0
+    bare = truth_rows(T, STILL)
+    away = position_errors(solution, bare, antenna_arm_m=arm)
+    np.testing.assert_allclose(np.linalg.norm(away.values, axis=1), np.linalg.norm(arm), atol=1e-6)
+
+
 def test_rows_with_attitude_among_others_are_moved():
     lever = (1.0, 0.4, -0.8)
     attitude = np.tile([0.1, -0.2, 0.7], (N, 1))

@@ -57,6 +57,18 @@ def test_independent_errors_give_their_differences():
     np.testing.assert_allclose(found.values, np.diff(noise, axis=0), atol=5e-3)
 
 
+def test_where_a_chain_begins_is_no_change():
+    """A chain of displacements that starts again 5 m off is judged by its displacements."""
+    chained, single = solution_pb2.SOLUTION_STATUS_CHAINED, solution_pb2.SOLUTION_STATUS_SINGLE
+    status = np.full(N, chained)
+    status[[0, 20]] = single
+    error = np.where(np.arange(N)[:, None] < 20, 1.0, 6.0) * np.ones(3)
+    solution = solution_rows(T, place(PATH + error), status=status)
+    found = position_change_errors(solution, truth_rows(T, place(PATH)), EVERY)
+    assert len(found) == N - 2
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-3)
+
+
 def test_no_pair_reaches_across_a_gap():
     epochs = EVERY.copy()
     epochs[20:25] = False  # five epochs away: one pair fewer than epochs less one
