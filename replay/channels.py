@@ -369,6 +369,24 @@ FILTER_RESOLUTION: Final = ChannelSpec(
         "success_rate": Tolerance(1e-6, "1"),
     },
 )
+RELATIVE_POSITION: Final = ChannelSpec(
+    "RELATIVE_POSITION",
+    "/filter/{run}/baseline",
+    "replay.RelativePosition",
+    "position relative to the base",
+    tolerances={
+        "baseline_ecef_m": _M,
+        "baseline_enu_m": _M,
+        "covariance_enu_m2": _M2,
+        "length_m": _M,
+        "length_std_m": _M,
+        "heading_rad": _RAD,
+        "heading_std_rad": Tolerance(1e-6, "rad"),
+        "pitch_rad": Tolerance(1e-6, "rad"),
+        "pitch_std_rad": Tolerance(1e-6, "rad"),
+        "base_age_s": Tolerance(1e-9, "s"),
+    },
+)
 SOLUTION: Final = ChannelSpec(
     "SOLUTION",
     "/solution/{run}",
@@ -417,6 +435,7 @@ CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     FILTER_GEOMETRY,
     FILTER_AMBIGUITIES,
     FILTER_RESOLUTION,
+    RELATIVE_POSITION,
     FILTER_STATE,
     FILTER_COVARIANCE,
     FILTER_EVENTS,

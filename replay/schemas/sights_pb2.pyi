@@ -1,5 +1,6 @@
 # Made by tools/generate_schemas.py from schemas/*.proto. Edit those, not this.
 from replay.schemas import geometry_pb2 as _geometry_pb2
+from replay.schemas import solution_pb2 as _solution_pb2
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
@@ -219,3 +220,29 @@ class AmbiguityResolution(_message.Message):
     success_rate: float
     status: AmbiguityStatus
     def __init__(self, candidate_count: _Optional[int] = ..., fixed_count: _Optional[int] = ..., ratio: _Optional[float] = ..., w_ratio: _Optional[float] = ..., threshold: _Optional[float] = ..., success_rate: _Optional[float] = ..., status: _Optional[_Union[AmbiguityStatus, str]] = ...) -> None: ...
+
+class RelativePosition(_message.Message):
+    __slots__ = ("baseline_ecef_m", "baseline_enu_m", "covariance_enu_m2", "length_m", "length_std_m", "heading_rad", "heading_std_rad", "pitch_rad", "pitch_std_rad", "base_age_s", "status")
+    BASELINE_ECEF_M_FIELD_NUMBER: _ClassVar[int]
+    BASELINE_ENU_M_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_ENU_M2_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_M_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_STD_M_FIELD_NUMBER: _ClassVar[int]
+    HEADING_RAD_FIELD_NUMBER: _ClassVar[int]
+    HEADING_STD_RAD_FIELD_NUMBER: _ClassVar[int]
+    PITCH_RAD_FIELD_NUMBER: _ClassVar[int]
+    PITCH_STD_RAD_FIELD_NUMBER: _ClassVar[int]
+    BASE_AGE_S_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    baseline_ecef_m: _geometry_pb2.Vector3
+    baseline_enu_m: _geometry_pb2.Vector3
+    covariance_enu_m2: _geometry_pb2.SymmetricMatrix3
+    length_m: float
+    length_std_m: float
+    heading_rad: float
+    heading_std_rad: float
+    pitch_rad: float
+    pitch_std_rad: float
+    base_age_s: float
+    status: _solution_pb2.SolutionStatus
+    def __init__(self, baseline_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., baseline_enu_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., covariance_enu_m2: _Optional[_Union[_geometry_pb2.SymmetricMatrix3, _Mapping]] = ..., length_m: _Optional[float] = ..., length_std_m: _Optional[float] = ..., heading_rad: _Optional[float] = ..., heading_std_rad: _Optional[float] = ..., pitch_rad: _Optional[float] = ..., pitch_std_rad: _Optional[float] = ..., base_age_s: _Optional[float] = ..., status: _Optional[_Union[_solution_pb2.SolutionStatus, str]] = ...) -> None: ...

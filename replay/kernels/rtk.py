@@ -1,0 +1,582 @@
+"""Relative positioning of a rover against a base, epoch after epoch.
+
+An epoch: what both receivers say of broken phases, the rover's own position and velocity
+from its codes and Doppler, single differences to the base, the filter's update with the
+measurements that disagree left out, and the integers. See
+:mod:`replay.kernels.double_difference` for the receivers' clocks,
+:mod:`replay.kernels.rtk_states` for the states and :mod:`replay.kernels.rtk_resolve` for
+the integers.
+"""
+
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from replay.kernels.ambiguity import COUNT_LIMIT
+from replay.kernels.dilution import dilutions
+from replay.kernels.double_difference import (
+    build_measures,
+    pair_rows,
+    residuals,
+    use_group,
+    worst_measure,
+)
+from replay.kernels.earth import enu_axes
+from replay.kernels.elementary import sqrt
+from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
+from replay.kernels.kalman import scalar_update, whitened_update
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
+from replay.kernels.rtk_output import (
+    note,
+    write_ambiguities,
+    write_baseline,
+    write_residuals,
+    write_resolution,
+    write_solution,
+)
+from replay.kernels.rtk_records import (
+    DGNSS,
+    EVENT_BASE_LOST,
+    EVENT_FIX_LOST,
+    EVENT_FIXED,
+    EVENT_SLIP,
+    EVENT_TOO_FEW,
+    FIXED,
+    FLOAT,
+    FLOAT_ONLY,
+    HOLD,
+    KINEMATIC,
+    MEASURE_DTYPE,
+    MEASURE_STATES,
+    PAIR_DTYPE,
+    PAIRS,
+    ROOM,
+    SINGLE,
+    VELOCITY,
+)
+from replay.kernels.rtk_resolve import (
+    ATTEMPT_DTYPE,
+    CANDIDATE_DTYPE,
+    fixed_unit_weight,
+    hold,
+    keep_integers,
+    resolve_epoch,
+    same_integers,
+)
+from replay.kernels.rtk_states import compare_frequencies, heed_breaks, predict
+from replay.kernels.single_point import SINGLE_STATE_DTYPE, solve_epoch, solve_velocity, true_time
+from replay.kernels.types import Array, Record
+
+_ROUNDS = 12
+_FAR_M = 20.0
+_LEAST_DIFFERENCES = 4
+_APART_SIGMAS = 4.0
+LATE_NS: Final = 10_000_000_000
+"""By this much a base epoch may be older than the base's newest one and still be used."""
+# Largest part of a baseline's length that its deviation may be for the length to be used.
+_SURE_PART = 0.1
+
+
+@njit(cache=True)
+def match_epochs(
+    rover_t: Array, rover_log: Array, base_t: Array, base_log: Array, now: int, last: int,
+    tolerance: int, wait: int, max_age: int, partner: Array, release: Array,
+) -> int:  # fmt: skip
+    """Say which rover epochs can be worked on by now, with which base epoch, and since when.
+
+    A rover's epoch waits for a base epoch that is no more than `tolerance` earlier, or until
+    a row comes that is `wait` later than it; then the newest base epoch serves that is no
+    more than `tolerance` later than the rover's and no more than `max_age` earlier. A base
+    epoch that is LATE_NS older than the base's newest one is no longer remembered.
+
+    Parameters
+    ----------
+    rover_t, rover_log : int64 arrays (n,), ns
+        Epochs that wait, in the order of their arrival.
+    base_t, base_log : int64 arrays (m,), ns
+    now : int, ns
+        Log time up to which rows are known.
+    last : int, ns
+        Log time of the release before.
+    tolerance, wait, max_age : int, ns
+    partner : int64 array (n,)
+        Filled: base epoch or minus one.
+    release : int64 array (n,), ns
+        Filled: log time of the row that made the epoch ready.
+
+    Returns
+    -------
+    int
+        How many of the rover's epochs are ready.
+    """
+    n, m = rover_t.shape[0], base_t.shape[0]
+    same, old, late_rover, late_base, arrived = 0, 0, 0, 0, 0
+    newest = -1
+    for k in range(n):
+        if k > 0 and rover_t[k] < rover_t[k - 1]:
+            same, old = 0, 0
+        while same < m and base_t[same] < rover_t[k] - tolerance:
+            same += 1
+        while old < m and base_t[old] < rover_t[k] - max_age:
+            old += 1
+        deadline = rover_log[k] + wait
+        while late_rover < n and rover_log[late_rover] < deadline:
+            late_rover += 1
+        while late_base < m and base_log[late_base] < deadline:
+            late_base += 1
+        at = -1
+        if same < m:
+            at = base_log[same]
+        if late_base < m and (at < 0 or base_log[late_base] < at):
+            at = base_log[late_base]
+        if late_rover < n and (at < 0 or rover_log[late_rover] < at):
+            at = rover_log[late_rover]
+        if at < 0 or at > now:
+            return k
+        at = max(at, rover_log[k], last)
+        last = at
+        while arrived < m and base_log[arrived] <= at:
+            newest = max(newest, base_t[arrived])
+            arrived += 1
+        release[k] = at
+        best = -1
+        for j in range(old, arrived):
+            age = rover_t[k] - base_t[j]
+            if age < -tolerance or age > max_age or base_t[j] < newest - LATE_NS:
+                continue
+            if best < 0 or base_t[j] > base_t[best]:
+                best = j
+        partner[k] = best
+    return n
+
+
+@njit(cache=True)
+def _own_position(
+    rows: Array, epoch: Record, single: Record, s: Record, work: Record, arrays: Array,
+    dropped: Array, u: Array, v: Array, cov: Array, velocity_cov: Array,
+) -> tuple[bool, float, bool]:  # fmt: skip
+    """One receiver alone: whether it has a position, its clock (m), whether it has a velocity."""
+    for i in range(3):
+        s["x"][i] = epoch["x"][i]
+        v[i] = 0.0
+    for i in range(SYSTEMS):
+        s["clock"][i] = epoch["clock"]
+    status = solve_epoch(rows, s, single, work, arrays[0], arrays[1], arrays[2], dropped, u)
+    clock = epoch["clock"]
+    if status < 0:
+        for i in range(3):
+            s["x"][i] = epoch["x"][i]
+        return False, clock, False
+    N = work["N"]
+    for i in range(3):
+        for j in range(3):
+            cov[i, j] = N[i, j]
+    for i in range(SYSTEMS - 1, -1, -1):
+        if work["column"][i] > 0:
+            clock = s["clock"][i]
+    drift = solve_velocity(rows, arrays[2], single, s, work, v, u)
+    for i in range(3):
+        for j in range(3):
+            velocity_cov[i, j] = N[i, j]
+        if drift != drift:
+            v[i] = 0.0
+    return True, clock, drift == drift
+
+
+@njit(cache=True)
+def update_epoch(
+    measures: Array, starts: Array, groups: int, A: Array, n: int, cfg: Record,
+    velocity: Array, velocity_cov: Array, x: Array, P: Array, dx: Array,
+) -> int:  # fmt: skip
+    """Use all measurements that agree; those that do not are left out, the worst one first.
+
+    Parameters
+    ----------
+    measures : array of MEASURE_DTYPE
+    starts : int64 array
+    groups : int
+    A : float64 array (n, n)
+        Predicted covariance; its last state is room for a clock.
+    n : int
+    cfg : record of RTK_CONFIG_DTYPE
+    velocity : float64 array (3,), m/s, ECEF
+        NaN where there is none, or no velocity among the states.
+    velocity_cov : float64 array (3, 3)
+    x : float64 array
+        Predicted states.
+    P : float64 array (n, n)
+        Filled.
+    dx : float64 array (n,)
+        Filled.
+
+    Returns
+    -------
+    int
+        Measurements left out.
+    """
+    total = starts[groups]
+    h, index = np.zeros(MEASURE_STATES + 1), np.zeros(MEASURE_STATES + 1, dtype=np.int64)
+    b, gain = np.zeros(n), np.zeros(n)
+    dropped = 0
+    while True:
+        for i in range(n):
+            dx[i] = 0.0
+            for j in range(n):
+                P[i, j] = A[i, j]
+        if velocity[0] == velocity[0]:
+            H, z = np.zeros((3, 3)), np.zeros(3)
+            for c in range(3):
+                index[c] = 3 + c
+                H[c, c] = 1.0
+                z[c] = velocity[c] - x[3 + c]
+            whitened_update(
+                P, n, H, index, 3, z, velocity_cov, 3, dx, np.zeros((3, 3)), np.zeros((3, 8)),
+                b, gain,
+            )  # fmt: skip
+        for group in range(groups):
+            use_group(measures, starts[group], starts[group + 1], P, n, dx, h, index, b, gain)
+        residuals(measures, starts, groups, P, n, dx, b, gain)
+        if dropped == _ROUNDS:
+            return dropped
+        worst = worst_measure(measures, total, cfg["code_gate"], cfg["phase_gate"])
+        if worst < 0:
+            return dropped
+        measures[worst]["use"] = 0
+        dropped += 1
+
+
+@njit(cache=True)
+def _constrain_length(x: Array, P: Array, n: int, base_x: Array, cfg: Record) -> None:
+    """Use the known length of the baseline, where the float one is sure enough to be linear."""
+    length2, spread = 0.0, 0.0
+    for c in range(3):
+        length2 += (x[c] - base_x[c]) * (x[c] - base_x[c])
+        spread += P[c, c]
+    length = sqrt(length2)
+    if not sqrt(spread) < _SURE_PART * cfg["length"] or length == 0.0:
+        return
+    h, index = np.zeros(3), np.zeros(3, dtype=np.int64)
+    b, gain, dx = np.zeros(n), np.zeros(n), np.zeros(n)
+    for c in range(3):
+        index[c] = c
+        h[c] = (x[c] - base_x[c]) / length / cfg["length_sigma"]
+    scalar_update(P, n, h, index, 3, (cfg["length"] - length) / cfg["length_sigma"], dx, b, gain)
+    for i in range(n):
+        x[i] += dx[i]
+
+
+@njit(cache=True)
+def believe(
+    measures: Array, candidates: Array, count: int, s: Record, cfg: Record, tried: Record,
+    x: Array, P: Array, before: Array, base_x: Array,
+) -> bool:  # fmt: skip
+    """Whether integers that passed the test of the search agree with all else."""
+    if tried["passed"] == 0:
+        return False
+    step = np.zeros(3)
+    for c in range(3):
+        spread = P[c, c] - tried["cov"][c, c]
+        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
+        if not abs(tried["x"][c] - x[c]) <= limit:
+            return False
+        step[c] = tried["x"][c] - before[c]
+    if cfg["length"] > 0.0:
+        length2 = 0.0
+        for c in range(3):
+            length2 += (tried["x"][c] - base_x[c]) * (tried["x"][c] - base_x[c])
+        if not abs(sqrt(length2) - cfg["length"]) <= 0.02 + 4.0 * cfg["length_sigma"]:
+            return False
+    if tried["whole"] == 0:
+        return True
+    if s["wet"] < 0 and cfg["ionosphere"] == 0:
+        unit = fixed_unit_weight(measures, candidates, count, before, step)
+        if unit > cfg["unit_weight"]:
+            return False
+    if same_integers(candidates, count, s):
+        s["doubt"] = 0
+        s["proof"] += 1
+    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
+        s["doubt"] += 1
+        return False
+    else:
+        s["doubt"] = 0
+        s["proof"] = 0
+    keep_integers(candidates, count, s)
+    return True
+
+
+@njit(cache=True)
+def settle(measures: Array, total: int, s: Record) -> int:
+    """Count epochs in use and rejections of each ambiguity; the number of phases in use."""
+    phases = 0
+    for k in range(total):
+        m = measures[k]
+        if m["kind"] == 1:
+            satellite, slot = m["satellite"], m["slot"]
+            if m["use"] == 1:
+                phases += 1
+                s["lock"][satellite, slot] += 1
+                s["rejected"][satellite, slot] = 0
+            else:
+                s["rejected"][satellite, slot] += 1
+                s["lock"][satellite, slot] = 0
+                s["known"][satellite, slot] = 0
+    return phases
+
+
+@njit(cache=True)
+def heed_base(epochs: Array, rows: Array, until: int, span: int, s: Record) -> None:
+    """Breaks of all base epochs since the one looked at last, those not used too.
+
+    Those that are `span` (ns) older than the one in use are past caring.
+    """
+    begin = epochs[until]["t"] - span
+    for j in range(until + 1):
+        if epochs[j]["t"] > s["base_t"] and epochs[j]["t"] >= begin:
+            first = epochs[j]["first"]
+            heed_breaks(rows[first : first + epochs[j]["count"]], 1, s)
+            s["base_t"] = epochs[j]["t"]
+
+
+@njit(cache=True)
+def _float_epoch(
+    part: Array, base_part: Array, t: int, age: float, s: Record, x: Array, P: Array, cfg: Record,
+    place: Array, base_x: Array, up: Array, v: Array, velocity_cov: Array, moves: bool,
+    pairs: Array, measures: Array, starts: Array, broken: Array, before: Array, u: Array,
+) -> int:  # fmt: skip
+    """Predict and update one epoch; how many measurements there were.
+
+    `before` is filled with the predicted states, which `z` of the measures is about.
+    """
+    count = pair_rows(part, base_part, age, cfg, place, base_x, up, pairs, u)
+    compare_frequencies(part, base_part, pairs, count, t, s, cfg["geometry_free"])
+    baseline2 = 0.0
+    for c in range(3):
+        baseline2 += (place[c] - base_x[c]) * (place[c] - base_x[c])
+    baseline = sqrt(baseline2)
+    A, n = predict(
+        part, base_part, pairs, count, t, baseline, s, cfg, x, P, place, v, moves, broken,
+        np.empty(ROOM, dtype=np.int64),
+    )  # fmt: skip
+    for i in range(n - 1):
+        before[i] = x[i]
+    new, dx = np.empty((n, n)), np.zeros(n)
+    speed = np.full(3, np.nan)
+    if moves and cfg["dynamics"] >= VELOCITY:
+        for c in range(3):
+            speed[c] = v[c]
+    total = 0
+    for turn in range(2):
+        if turn == 1 or cfg["dynamics"] != KINEMATIC:
+            pair_rows(part, base_part, age, cfg, before[:3], base_x, up, pairs, u)
+        groups = build_measures(
+            part, base_part, pairs, count, abs(age), baseline, s, cfg, before, measures, starts
+        )
+        total = starts[groups]
+        update_epoch(measures, starts, groups, A, n, cfg, speed, velocity_cov, before, new, dx)
+        far2 = dx[0] * dx[0] + dx[1] * dx[1] + dx[2] * dx[2]
+        if cfg["dynamics"] != KINEMATIC or far2 < _FAR_M * _FAR_M:
+            break
+        # Its prior says next to nothing of the position: it may as well be about a nearer one.
+        for c in range(3):
+            before[c] += dx[c]
+    for i in range(n - 1):
+        x[i] = before[i] + dx[i]
+        for j in range(n - 1):
+            P[i, j] = new[i, j]
+    return total
+
+
+@njit(cache=True)
+def _resolve(
+    part: Array, measures: Array, total: int, pairs: Array, s: Record, cfg: Record, x: Array,
+    P: Array, before: Array, base_x: Array, candidates: Array, tries: Array, t: int, log_t: int,
+    ambiguities: Array, resolutions: Array, counts: Array,
+) -> bool:  # fmt: skip
+    """The integers of an epoch; whether they are believed."""
+    count = resolve_epoch(measures, total, pairs, part, s, cfg, x, P, candidates, tries)
+    tried = tries[0]
+    if tried["count"] == 0:
+        return False
+    fixed = believe(measures, candidates, count, s, cfg, tried, x, P, before, base_x)
+    held = False
+    if fixed and cfg["mode"] == HOLD and s["fixed"] + 1 >= cfg["hold_count"]:
+        held = tried["whole"] == 1
+    write_ambiguities(
+        candidates, count, measures, pairs, part, tried["whole"] == 1, fixed, held, t, log_t,
+        ambiguities, counts,
+    )  # fmt: skip
+    write_resolution(tried, cfg["threshold"], fixed, held, t, log_t, resolutions, counts)
+    if held:
+        n = s["n"]
+        hold(candidates, count, x, P, n, cfg)
+    return fixed
+
+
+@njit(cache=True)
+def _count_satellites(
+    part: Array, measures: Array, total: int, pairs: Array, status: int, weight: Array
+) -> None:
+    """Mark the satellites that the position rests on, for the dilution of precision."""
+    if status <= SINGLE:
+        return
+    for k in range(part.shape[0]):
+        weight[k] = 0.0
+    for k in range(total):
+        if measures[k]["use"] == 1 and (measures[k]["kind"] == 1 or status == DGNSS):
+            weight[pairs[measures[k]["pair"]]["rover"]] = 1.0
+
+
+@njit(cache=True)
+def run_rtk(
+    state: Array, x: Array, P: Array, config: Array, single_config: Array, scratch: Array,
+    epochs: Array, rows: Array, base_epochs: Array, base_rows: Array, partner: Array,
+    release: Array, solutions: Array, baselines: Array, innovations: Array, ambiguities: Array,
+    resolutions: Array, notes: Array, counts: Array,
+) -> None:  # fmt: skip
+    """Work on all rover epochs of a block that are ready.
+
+    Parameters
+    ----------
+    state, config, single_config, scratch : arrays of one record each
+        RTK_STATE_DTYPE, RTK_CONFIG_DTYPE, SINGLE_CONFIG_DTYPE, SOLVE_DTYPE.
+    x, P : float64 arrays (ROOM,), (ROOM, ROOM)
+        States and covariance; changed.
+    epochs, rows, base_epochs, base_rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
+    partner, release : int64 arrays (epochs,)
+        As :func:`match_epochs` filled them.
+    solutions : array (epochs,) of SINGLE_ROW_DTYPE
+    baselines : array (epochs,) of BASELINE_ROW_DTYPE
+    innovations : array (6 * rows,) of RESIDUAL_DTYPE
+    ambiguities : array (3 * rows,) of AMBIGUITY_ROW_DTYPE
+    resolutions : array (epochs,) of RESOLUTION_ROW_DTYPE
+    notes : array (4 * epochs + 3 * rows,) of NOTE_DTYPE
+    counts : int64 array (6,)
+        Filled: rows of each of the six outputs, in the order above.
+    """
+    s, cfg, single, work = state[0], config[0], single_config[0], scratch[0]
+    u, v, base_v = np.zeros(3), np.zeros(3), np.zeros(3)
+    own = np.zeros(2, dtype=SINGLE_STATE_DTYPE)
+    arrays, base_arrays = np.zeros((3, SATELLITES)), np.zeros((3, SATELLITES))
+    dropped = np.zeros(SATELLITES, dtype=np.int64)
+    pairs = np.zeros(PAIRS, dtype=PAIR_DTYPE)
+    measures = np.zeros(2 * PAIRS * SLOTS, dtype=MEASURE_DTYPE)
+    candidates = np.zeros(COUNT_LIMIT, dtype=CANDIDATE_DTYPE)
+    tries = np.zeros(2, dtype=ATTEMPT_DTYPE)
+    starts = np.zeros(2 * SYSTEMS * SLOTS + 1, dtype=np.int64)
+    broken = np.zeros((SATELLITES, SLOTS), dtype=np.int64)
+    base_x, up, before, axes = np.zeros(3), np.zeros(3), np.zeros(ROOM), np.zeros((3, 3))
+    cov, velocity_cov = np.zeros((3, 3)), np.zeros((3, 3))
+    position, unused, unused_cov = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
+    span = int(cfg["max_age"] * 1e9)
+    for i in range(6):
+        counts[i] = 0
+    for e in range(epochs.shape[0]):
+        epoch = epochs[e]
+        log_t = release[e]
+        part = rows[epoch["first"] : epoch["first"] + epoch["count"]]
+        heed_breaks(part, 0, s)
+        if epoch["placed"] == 0:
+            continue
+        alone, clock, moves = _own_position(
+            part, epoch, single, own[0], work, arrays, dropped, u, v, cov, velocity_cov
+        )
+        t = true_time(epoch["t"], clock)
+        enu_axes(own[0]["x"][0], own[0]["x"][1], own[0]["x"][2], work["axes"])
+        for i in range(3):
+            up[i] = work["axes"][2, i]
+            position[i] = own[0]["x"][i]
+        here = partner[e] >= 0
+        if here:
+            heed_base(base_epochs, base_rows, partner[e], span, s)
+            here = base_epochs[partner[e]]["placed"] == 1
+        if not here and s["lost"] == 0:
+            since = (epoch["t"] - s["base_t"]) * 1e-9 if s["base_t"] >= 0 else 0.0
+            note(notes, counts, t, log_t, EVENT_BASE_LOST, -1, since)
+        s["lost"] = 0 if here else 1
+        status = SINGLE if alone else 0
+        total = 0
+        if here:
+            base_epoch = base_epochs[partner[e]]
+            base_part = base_rows[base_epoch["first"] : base_epoch["first"] + base_epoch["count"]]
+            age = (epoch["t"] - base_epoch["t"]) * 1e-9
+            base_clock = base_epoch["clock"]
+            for i in range(3):
+                base_x[i] = base_epoch["x"][i]
+                base_v[i] = 0.0
+            if cfg["moving"] == 1:
+                here, base_clock, _ = _own_position(
+                    base_part, base_epoch, single, own[1], work, base_arrays, dropped, u, base_v,
+                    unused, unused_cov,
+                )  # fmt: skip
+                for i in range(3):
+                    base_x[i] = own[1]["x"][i]
+        if here:
+            total = _float_epoch(
+                part, base_part, epoch["t"], age, s, x, P, cfg, own[0]["x"], base_x, up, v,
+                velocity_cov, moves, pairs, measures, starts, broken, before, u,
+            )  # fmt: skip
+            for satellite in range(SATELLITES):
+                for slot in range(SLOTS):
+                    if broken[satellite, slot] == 1:
+                        note(notes, counts, t, log_t, EVENT_SLIP, satellite, float(slot))
+            if total < _LEAST_DIFFERENCES:
+                note(notes, counts, t, log_t, EVENT_TOO_FEW, -1, float(total))
+                total = 0
+        if total > 0:
+            if cfg["length"] > 0.0:
+                _constrain_length(x, P, s["n"], base_x, cfg)
+            write_residuals(measures, total, pairs, part, t, log_t, innovations, counts)
+            phases = settle(measures, total, s)
+            status = FLOAT if phases >= _LEAST_DIFFERENCES else DGNSS
+            tries[0]["fixed"] = 0
+            tried = status == FLOAT and cfg["mode"] != FLOAT_ONLY
+            if tried and _resolve(
+                part, measures, total, pairs, s, cfg, x, P, before, base_x, candidates, tries,
+                t, log_t, ambiguities, resolutions, counts,
+            ):  # fmt: skip
+                status = FIXED
+            for i in range(3):
+                if status == FIXED:
+                    position[i] = tries[0]["x"][i]
+                else:
+                    position[i] = x[i]
+                for j in range(3):
+                    if status == FIXED:
+                        unused[i, j] = tries[0]["cov"][i, j]
+                    else:
+                        unused[i, j] = P[i, j]
+            # The base moves on until the rover's epoch.
+            ahead = age - (clock - base_clock) / SPEED_OF_LIGHT_M_S
+            for i in range(3):
+                base_x[i] += base_v[i] * ahead
+            write_baseline(
+                baselines[counts[1]], t, log_t, status, position, unused, base_x, age, axes
+            )
+            counts[1] += 1
+        if status == FIXED and s["status"] != FIXED:
+            note(notes, counts, t, log_t, EVENT_FIXED, -1, float(tries[0]["fixed"]))
+        if status != FIXED and s["status"] == FIXED:
+            note(notes, counts, t, log_t, EVENT_FIX_LOST, -1, float(s["fixed"]))
+        s["status"] = status
+        s["fixed"] = s["fixed"] + 1 if status == FIXED else 0
+        if status == 0:
+            continue
+        out = solutions[counts[0]]
+        counts[0] += 1
+        if cfg["moving"] == 1 and status > SINGLE:
+            # Where the base is, is known no better than a single receiver tells.
+            status = SINGLE
+            for i in range(3):
+                position[i] = own[0]["x"][i]
+        if status == SINGLE:
+            write_solution(
+                out, epoch, t, log_t, status, position, cov, v, velocity_cov, moves, work
+            )
+        else:
+            write_solution(
+                out, epoch, t, log_t, status, position, unused, v, velocity_cov, moves, work
+            )
+        _count_satellites(part, measures, total, pairs, status, arrays[2])
+        dilutions(part, arrays[2], own[0]["x"], work, u, out)

@@ -1,0 +1,333 @@
+"""Relative positioning: a rover's codes and phases against a base's.
+
+A rover's epoch waits for the base's epoch of the same nominal time, or for as long as it
+is told to; what it gives bears the log time of the row that made it ready. The base
+stands still, or moves: then only the position relative to it is precise, and the solution
+is that of the rover alone. The arithmetic is in :mod:`replay.kernels.rtk`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.configuration import Section
+from replay.errors import ConfigurationError
+from replay.gnss.measurements import Selection, gather_epochs, select_signals
+from replay.kernels import rtk, rtk_records, single_point, weighting
+from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SLOTS, SYSTEMS
+from replay.kernels.least_squares import SOLVE_DTYPE
+from replay.kernels.sights import NOTE_DTYPE
+from replay.log.columns import Columns
+from replay.stages.base import (
+    BASE,
+    RECEIVER,
+    Block,
+    Context,
+    Outputs,
+    Port,
+    StageSpec,
+    dump_arrays,
+    restore_arrays,
+)
+from replay.stages.gnss_columns import (
+    antenna_solution_columns,
+    event_columns,
+    geometry_columns,
+    residual_columns,
+)
+from replay.stages.rtk_columns import (
+    RTK_EVENT_TEXT,
+    ambiguity_columns,
+    baseline_columns,
+    resolution_columns,
+)
+from replay.stages.rtk_config import RtkConfig
+from replay.stages.rtk_ins_config import RtkInsConfig
+from replay.stages.satellites import Satellites
+from replay.stages.spp import single_config
+
+Array = np.ndarray[Any, Any]
+
+_NS: Final = 1_000_000_000
+_WEIGHTINGS: Final = {
+    "equal": weighting.EQUAL,
+    "sine": weighting.SINE,
+    "threshold": weighting.THRESHOLD,
+    "double-angle": weighting.DOUBLE_ANGLE,
+    "strength": weighting.STRENGTH,
+    "sum": weighting.SUM,
+}
+_DYNAMICS: Final = ("static", "kinematic", "velocity", "acceleration")
+_MODES: Final = ("instantaneous", "continuous", "fix-and-hold", "float")
+_TESTS: Final = ("ratio", "w-ratio")
+_PARTIALS: Final = ("none", "elevation", "success")
+_READ: Final = (channels.GNSS_OBS, channels.SATELLITES, channels.CORRECTIONS, channels.COARSE)
+
+
+@dataclasses.dataclass(slots=True)
+class RtkState:
+    """Everything that crosses from one block to the next."""
+
+    selection: Selection
+    config: Array
+    single: Array
+    times: tuple[int, int, int]  # ns: tolerance, wait, largest age
+    kernel: Array
+    x: Array
+    P: Array
+    epochs: Array  # of the rover, that wait
+    rows: Array
+    base_epochs: Array  # the last one used, and later ones
+    base_rows: Array
+    now: Array  # ns, one element: log time of the last row
+    released: Array  # ns, one element: log time of the last epoch's outputs
+
+
+class Rtk:
+    """The stage `rtk`."""
+
+    spec = StageSpec(
+        name="rtk",
+        version=1,
+        inputs=tuple(Port(channel, role) for role in (RECEIVER, BASE) for channel in _READ),
+        outputs=(
+            Port(channels.FILTER_INNOVATIONS),
+            Port(channels.FILTER_GEOMETRY),
+            Port(channels.FILTER_AMBIGUITIES),
+            Port(channels.FILTER_RESOLUTION),
+            Port(channels.RELATIVE_POSITION),
+            Port(channels.FILTER_EVENTS),
+            Port(channels.SOLUTION),
+        ),
+        trigger=Port(channels.GNSS_OBS),
+    )
+
+    def start(self, config: Section, context: Context) -> RtkState:
+        """State before the first row."""
+        if not isinstance(config, RtkConfig):
+            raise TypeError("rtk takes an RtkConfig")
+        single = single_config(config.gnss, config.spp)
+        single["velocity"] = 1
+        base = config.base
+        return RtkState(
+            selection=select_signals(config.gnss.signals, config.gnss.systems),
+            config=rtk_config(config, single),
+            single=single,
+            times=(round(base.tolerance * _NS), round(base.wait * _NS), round(base.max_age * _NS)),
+            kernel=rtk_records.new_rtk_state(),
+            x=np.zeros(rtk_records.ROOM),
+            P=np.zeros((rtk_records.ROOM, rtk_records.ROOM)),
+            epochs=np.zeros(0, dtype=EPOCH_DTYPE),
+            rows=np.zeros(0, dtype=MEASURED_DTYPE),
+            base_epochs=np.zeros(0, dtype=EPOCH_DTYPE),
+            base_rows=np.zeros(0, dtype=MEASURED_DTYPE),
+            now=np.zeros(1, dtype=np.int64),
+            released=np.zeros(1, dtype=np.int64),
+        )
+
+    def step(self, state: RtkState, block: Block) -> tuple[RtkState, Outputs]:
+        """Take a block of epochs of both receivers."""
+        for role in (RECEIVER, BASE):
+            columns = [block.get(Port(channel, role).name) for channel in _READ]
+            observations = columns[0]
+            if observations is None:
+                continue
+            found = gather_epochs(observations, state.selection, *columns[1:])
+            state.now[0] = max(int(state.now[0]), int(observations.log_time_ns[-1]))
+            if role == RECEIVER:
+                state.epochs, state.rows = join_epochs(
+                    state.epochs, state.rows, found.epochs, found.rows
+                )
+            else:
+                state.base_epochs, state.base_rows = join_epochs(
+                    state.base_epochs, state.base_rows, found.epochs, found.rows
+                )
+        return state, self._run(state, int(state.now[0]))
+
+    def finish(self, state: RtkState) -> Outputs:
+        """Epochs that still wait for the base, with what there is of it."""
+        partner, release, _ = self._match(state, np.iinfo(np.int64).max // 4, wait=0)
+        release[:] = np.maximum(release, state.now[0])
+        return self._work(state, len(state.epochs), partner, release)
+
+    def dump(self, state: RtkState) -> bytes:
+        """The state as bytes."""
+        n = int(state.kernel["n"][0])
+        return dump_arrays(
+            {
+                **{name: getattr(state, name) for name in _dump_types()},
+                "x": state.x[:n],
+                "P": state.P[:n, :n],
+            }
+        )
+
+    def restore(self, state: RtkState, data: bytes) -> RtkState:
+        """The state of a dump."""
+        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
+        n = int(arrays["kernel"]["n"][0])
+        x, P = np.zeros_like(state.x), np.zeros_like(state.P)
+        x[:n] = arrays["x"]
+        P[:n, :n] = arrays["P"]
+        return dataclasses.replace(state, **{**arrays, "x": x, "P": P})
+
+    @staticmethod
+    def _match(state: RtkState, now: int, *, wait: int) -> tuple[Array, Array, int]:
+        count = len(state.epochs)
+        partner = np.full(count, -1, dtype=np.int64)
+        release = np.zeros(count, dtype=np.int64)
+        tolerance, _, max_age = state.times
+        ready = rtk.match_epochs(
+            np.ascontiguousarray(state.epochs["t"]),
+            np.ascontiguousarray(state.epochs["log_t"]),
+            np.ascontiguousarray(state.base_epochs["t"]),
+            np.ascontiguousarray(state.base_epochs["log_t"]),
+            now, int(state.released[0]), tolerance, wait, max_age, partner, release,
+        )  # fmt: skip
+        return partner, release, ready
+
+    def _run(self, state: RtkState, now: int) -> Outputs:
+        partner, release, ready = self._match(state, now, wait=state.times[1])
+        return self._work(state, ready, partner, release)
+
+    def _work(self, state: RtkState, ready: int, partner: Array, release: Array) -> Outputs:
+        """Work on the first `ready` epochs of those that wait."""
+        if ready == 0:
+            self._forget(state)
+            return {}
+        epochs = state.epochs[:ready]
+        end = int(epochs["first"][-1] + epochs["count"][-1])
+        solutions = np.zeros(ready, dtype=single_point.SINGLE_ROW_DTYPE)
+        baselines = np.zeros(ready, dtype=rtk_records.BASELINE_ROW_DTYPE)
+        innovations = np.zeros(2 * SLOTS * end, dtype=single_point.RESIDUAL_DTYPE)
+        ambiguities = np.zeros(SLOTS * end, dtype=rtk_records.AMBIGUITY_ROW_DTYPE)
+        resolutions = np.zeros(ready, dtype=rtk_records.RESOLUTION_ROW_DTYPE)
+        # Per epoch the base's loss, too few differences, a fix or its loss; and breaks.
+        notes = np.zeros(ready * (4 + SLOTS * rtk_records.PAIRS), dtype=NOTE_DTYPE)
+        counts = np.zeros(6, dtype=np.int64)
+        rtk.run_rtk(
+            state.kernel, state.x, state.P, state.config, state.single,
+            np.zeros(1, dtype=SOLVE_DTYPE), epochs, state.rows, state.base_epochs,
+            state.base_rows, partner, release, solutions, baselines, innovations, ambiguities,
+            resolutions, notes, counts,
+        )  # fmt: skip
+        state.released[0] = release[ready - 1]
+        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, ready)
+        self._forget(state)
+        columns: dict[channels.ChannelSpec, Columns] = {
+            channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[2]]),
+            channels.FILTER_GEOMETRY: geometry_columns(solutions[: counts[0]]),
+            channels.FILTER_AMBIGUITIES: ambiguity_columns(ambiguities[: counts[3]]),
+            channels.FILTER_RESOLUTION: resolution_columns(resolutions[: counts[4]]),
+            channels.RELATIVE_POSITION: baseline_columns(baselines[: counts[1]]),
+            channels.FILTER_EVENTS: event_columns(notes[: counts[5]], RTK_EVENT_TEXT),
+            channels.SOLUTION: antenna_solution_columns(solutions[: counts[0]]),
+        }
+        return {channel.name: rows for channel, rows in columns.items() if len(rows)}
+
+    @staticmethod
+    def _forget(state: RtkState) -> None:
+        """Drop base epochs that no rover epoch can ask for any more."""
+        times = state.base_epochs["t"]
+        if len(times):
+            keep = times >= int(times.max()) - rtk.LATE_NS - state.times[2]
+            state.base_epochs, state.base_rows = forget_epochs(
+                state.base_epochs, state.base_rows, int(np.argmax(keep))
+            )
+
+
+class MovingBaseSatellites(Satellites):
+    """The stage `base-satellites` for a base that knows its position no better than the rover."""
+
+    def __init__(self) -> None:
+        super().__init__(BASE)
+
+    def start(self, config: Section, context: Context) -> Any:
+        """State before the first row: the base finds its own coarse position."""
+        return Satellites(RECEIVER).start(config, context)
+
+
+def _dump_types() -> dict[str, np.dtype[Any]]:
+    return {
+        "kernel": rtk_records.RTK_STATE_DTYPE,
+        "epochs": EPOCH_DTYPE,
+        "rows": MEASURED_DTYPE,
+        "base_epochs": EPOCH_DTYPE,
+        "base_rows": MEASURED_DTYPE,
+        "now": np.dtype(np.int64),
+        "released": np.dtype(np.int64),
+        "x": np.dtype(np.float64),
+        "P": np.dtype(np.float64),
+    }
+
+
+def join_epochs(epochs: Array, rows: Array, more: Array, more_rows: Array) -> tuple[Array, Array]:
+    """Epochs with their rows, the first numbers of rows set right."""
+    if len(epochs) == 0:
+        return more, more_rows
+    more = more.copy()
+    more["first"] += len(rows)
+    return np.concatenate([epochs, more]), np.concatenate([rows, more_rows])
+
+
+def forget_epochs(epochs: Array, rows: Array, count: int) -> tuple[Array, Array]:
+    """Epochs from `count` on with their rows."""
+    if count == len(epochs):
+        return epochs[:0].copy(), rows[:0].copy()
+    start = int(epochs["first"][count])
+    epochs = epochs[count:].copy()
+    epochs["first"] -= start
+    return epochs, rows[start:].copy()
+
+
+def rtk_config(config: RtkConfig | RtkInsConfig, single: Array) -> Array:
+    """Settings as the record that the compiled loop reads.
+
+    Raises
+    ------
+    ConfigurationError
+        Where a list has the wrong length or a number cannot be.
+    """
+    differences, motion = config.rtk.differences, config.rtk.motion
+    ambiguities, base = config.rtk.ambiguities, config.base
+    record = np.zeros(1, dtype=rtk_records.RTK_CONFIG_DTYPE)
+    if not 1 <= differences.frequencies <= SLOTS:
+        raise ConfigurationError(f"rtk.differences.frequencies is from 1 to {SLOTS}")
+    for name, count in (("code_sigma", SLOTS), ("phase_sigma", SLOTS), ("system_scale", SYSTEMS)):
+        values = getattr(differences, name)
+        if len(values) not in (1, count):
+            raise ConfigurationError(f"rtk.differences.{name} has {count} numbers or one")
+        record[name] = values
+    if base.moving and base.max_age > 10.0:
+        raise ConfigurationError(
+            f"base.max_age is {base.max_age} s: a base that moves is not where it was",
+            mend="--set base.max_age=1",
+        )
+    record["mask"] = config.gnss.mask
+    record["cn0_mask"] = config.gnss.cn0_mask
+    record["excluded"] = single["excluded"]
+    record["slots"] = differences.frequencies
+    record["weighting"] = _WEIGHTINGS[differences.weighting]
+    for name in ("clock_stability", "baseline_noise", "code_gate", "phase_gate"):
+        record[name] = getattr(differences, name)
+    for name in motion.__struct_fields__:
+        if name not in ("dynamics", "ionosphere", "troposphere"):
+            record[name] = getattr(motion, name)
+    record["dynamics"] = _DYNAMICS.index(motion.dynamics)
+    record["ionosphere"] = int(motion.ionosphere)
+    record["troposphere"] = int(motion.troposphere)
+    for name in ambiguities.__struct_fields__:
+        if name not in ("mode", "test", "mask", "partial"):
+            record[name] = getattr(ambiguities, name)
+    record["mode"] = _MODES.index(ambiguities.mode)
+    record["test"] = _TESTS.index(ambiguities.test)
+    record["partial"] = _PARTIALS.index(ambiguities.partial)
+    record["mask_resolve"] = ambiguities.mask
+    record["max_age"] = base.max_age
+    record["moving"] = int(base.moving)
+    record["length"] = base.length
+    record["length_sigma"] = base.length_sigma
+    return record
