@@ -55,6 +55,9 @@ from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event, state_count, total_count
 
 EVENT_CLOCK_JUMP = 21
+SKIPPED = 0
+ALIGNING = 1
+NAVIGATING = 2
 _NAN = float("nan")
 _EARTH_M = 6378137.0
 
@@ -109,7 +112,7 @@ def epoch_time(s: Record, g: Record, epoch: Record) -> int:
 
 
 @njit(cache=True)
-def _single(
+def single_fix(
     s: Record,
     tcfg: Record,
     epoch: Record,
@@ -237,7 +240,7 @@ def use_epoch(
     solutions, states, covariances, _, events, counts, gnss, residuals, tally = out
     _, observed, scratch, weight, _, u, v = room
     x = observed[:3]
-    before = observed[3:6]
+    first = tally[0]
     t = s["t"]
     remove_sensor_errors(s, work)
     carry_clocks(s, g, cfg, tcfg)
@@ -264,7 +267,7 @@ def use_epoch(
     if tcfg["phase"] == 1:
         antenna(s, work, tcfg["lever"], x, v)
         phases = use_phase_changes(
-            s, g, cfg, tcfg, work, epoch, rows, x, u, before, scratch, residuals, tally
+            s, g, cfg, tcfg, work, epoch, rows, x, u, scratch, residuals, tally
         )
         if tcfg["code"] == 0:
             used = phases
@@ -282,7 +285,11 @@ def use_epoch(
             )
             s["in_outage"] = 0
         s["fix_t"] = t
+    # What is said of the epoch was known when the sample after it came, not before.
+    for k in range(first, tally[0]):
+        residuals[k]["log_t"] = log_t
     _emit_satellites(s, g, cfg, epoch, rows, weight, x, u, solve, gnss[tally[1]])
+    gnss[tally[1]]["log_t"] = log_t
     tally[1] += 1
     emit_solution(
         s, work, STATUS_UPDATED if used > 0 else STATUS_PREDICTED, log_t, solutions, counts
@@ -319,7 +326,7 @@ def _take_epochs(
         part = rows[epoch["first"] : epoch["first"] + epoch["count"]]
         k += 1
         if s["mode"] != RUNNING:
-            if not _single(s, tcfg, epoch, part, fix, solve, room):
+            if not single_fix(s, tcfg, epoch, part, fix, solve, room):
                 continue
             if fix["t"] < s["imu_t"]:
                 early += 1
@@ -389,7 +396,6 @@ def run_tight(
     work, solve = scratch[0], solve_scratch[0]
     # What a step leaves in the scratch must not depend on where the block was cut.
     work["decay_dt"] = -1.0
-    events, counts, solutions = out[4], out[5], out[0]
     fix = np.zeros(1, dtype=FIX_DTYPE)[0]
     room = (
         np.zeros(1, dtype=SINGLE_STATE_DTYPE),
@@ -402,47 +408,74 @@ def run_tight(
     )
     taken = 0
     for k in range(imu_t.shape[0]):
-        t = imu_t[k]
-        log_t = imu_log_t[k]
-        if not (all_finite(imu_w[k]) and all_finite(imu_f[k])):
-            record_event(events, counts, t, log_t, EVENT_NOT_FINITE, 0.0, NOTE_IMU)
+        state_of = begin_sample(s, cfg, work, imu_t[k], imu_log_t[k], imu_w[k], imu_f[k], out)
+        if state_of == SKIPPED:
             continue
-        if s["imu_t"] < 0:
-            s["imu_t"] = t
-            s["t"] = t
-            continue
-        if t <= s["imu_t"]:
-            late = (s["imu_t"] - t) * 1e-9
-            record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, late, NOTE_IMU)
-            continue
-        dt = (t - s["imu_t"]) * 1e-9
-        if dt > cfg["imu_gap"]:
-            record_event(events, counts, t, log_t, EVENT_IMU_GAP, dt, NOTE_IMU)
-        w_raw, f_raw = s["w_raw"], s["f_raw"]
-        for i in range(3):
-            w_raw[i] = imu_w[k, i]
-            f_raw[i] = imu_f[k, i]
-        aligning = s["mode"] != RUNNING
-        if aligning:
-            align_sample(s, cfg, work, dt, t, log_t, events, counts)
         taken = _take_epochs(
-            s, g, cfg, tcfg, work, epochs, rows, taken, t, log_t, fix, solve, room, out
-        )
-        s["imu_t"] = t
-        if s["mode"] != RUNNING:
-            s["t"] = t
-            continue
-        since = (t - s["fix_t"]) * 1e-9
-        if s["in_outage"] == 0 and since > cfg["outage_limit"]:
-            s["in_outage"] = 1
-            record_event(events, counts, t, log_t, EVENT_OUTAGE_BEGIN, since, NOTE_FIX)
-        advance(s, cfg, work, t)
-        if not aligning:
-            push_sample(s, w_raw, f_raw)
-        constrain(s, cfg, work, t, log_t, out[:6])
-        slot = t // cfg["solution_interval"]
-        if slot > s["emitted_slot"]:
-            s["emitted_slot"] = slot
-            status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
-            emit_solution(s, work, status, log_t, solutions, counts)
+            s, g, cfg, tcfg, work, epochs, rows, taken, imu_t[k], imu_log_t[k], fix, solve, room,
+            out,
+        )  # fmt: skip
+        end_sample(s, cfg, work, imu_t[k], imu_log_t[k], state_of == ALIGNING, out)
     return taken
+
+
+@njit(cache=True)
+def begin_sample(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    t: int,
+    log_t: int,
+    rate: Array,
+    force: Array,
+    out: tuple[Any, ...],
+) -> int:
+    """Take an inertial sample at hand: SKIPPED, ALIGNING or NAVIGATING."""
+    events, counts = out[4], out[5]
+    if not (all_finite(rate) and all_finite(force)):
+        record_event(events, counts, t, log_t, EVENT_NOT_FINITE, 0.0, NOTE_IMU)
+        return SKIPPED
+    if s["imu_t"] < 0:
+        s["imu_t"] = t
+        s["t"] = t
+        return SKIPPED
+    if t <= s["imu_t"]:
+        late = (s["imu_t"] - t) * 1e-9
+        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, late, NOTE_IMU)
+        return SKIPPED
+    dt = (t - s["imu_t"]) * 1e-9
+    if dt > cfg["imu_gap"]:
+        record_event(events, counts, t, log_t, EVENT_IMU_GAP, dt, NOTE_IMU)
+    w_raw, f_raw = s["w_raw"], s["f_raw"]
+    for i in range(3):
+        w_raw[i] = rate[i]
+        f_raw[i] = force[i]
+    if s["mode"] == RUNNING:
+        return NAVIGATING
+    align_sample(s, cfg, work, dt, t, log_t, events, counts)
+    return ALIGNING
+
+
+@njit(cache=True)
+def end_sample(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, aligning: bool, out: tuple[Any, ...]
+) -> None:
+    """Carry the filter to the sample's time: outage, constraints, a predicted solution."""
+    solutions, events, counts = out[0], out[4], out[5]
+    s["imu_t"] = t
+    if s["mode"] != RUNNING:
+        s["t"] = t
+        return
+    since = (t - s["fix_t"]) * 1e-9
+    if s["in_outage"] == 0 and since > cfg["outage_limit"]:
+        s["in_outage"] = 1
+        record_event(events, counts, t, log_t, EVENT_OUTAGE_BEGIN, since, NOTE_FIX)
+    advance(s, cfg, work, t)
+    if not aligning:
+        push_sample(s, s["w_raw"], s["f_raw"])
+    constrain(s, cfg, work, t, log_t, out[:6])
+    slot = t // cfg["solution_interval"]
+    if slot > s["emitted_slot"]:
+        s["emitted_slot"] = slot
+        status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
+        emit_solution(s, work, status, log_t, solutions, counts)

@@ -357,7 +357,6 @@ def use_phase_changes(
     rows: Array,
     x: Array,
     u: Array,
-    before: Array,
     scratch: Array,
     innovations: Array,
     counts: Array,
@@ -395,9 +394,6 @@ def use_phase_changes(
             d1 = earlier["position"][1] - clone[1]
             d2 = earlier["position"][2] - clone[2]
             then = sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-            before[0] = d0 / then
-            before[1] = d1 / then
-            before[2] = d2 / then
             for slot in range(SLOTS):
                 same = row["signal"][slot] != 0 and row["signal"][slot] == earlier["signal"][slot]
                 if not same or row["lock_lost"][slot] & 1 == 1:
@@ -412,9 +408,11 @@ def use_phase_changes(
                 for i in range(3):
                     u[i] = -u[i]
                 count = position_row(s, lever, u, h, index)
+                # The same line of sight for both ends: what its turning tells of the position
+                # itself is less than what the errors of phases, which are not white, feign.
                 for i in range(3):
                     u[i] = -u[i]
-                    h[count + i] = before[i]
+                    h[count + i] = u[i]
                     index[count + i] = first + CLONE + i
                 h[count + 3] = 1.0
                 index[count + 3] = first + CHANGE

@@ -1,0 +1,290 @@
+"""Tightly coupled RTK/INS: differences to a base as measurements of an inertial system.
+
+15 or 21 inertial error states and the ambiguities of single differences in one filter.
+A rover's epoch waits for the base's, and inertial rows wait as long (`tight.latency`).
+The arithmetic is in :mod:`replay.kernels.tight_rtk`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.configuration import Section
+from replay.errors import ConfigurationError, DataError
+from replay.gnss.measurements import Selection, gather_epochs, select_signals
+from replay.ins.states import state_names
+from replay.kernels import records, rtk, rtk_records, tight_rtk
+from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SLOTS
+from replay.kernels.least_squares import SOLVE_DTYPE
+from replay.kernels.sights import NOTE_DTYPE
+from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.log.columns import Columns, concatenate
+from replay.stages.base import (
+    BASE,
+    RECEIVER,
+    Block,
+    Context,
+    Outputs,
+    Port,
+    StageSpec,
+    dump_arrays,
+    restore_arrays,
+)
+from replay.stages.gnss_columns import event_columns as gnss_event_columns
+from replay.stages.gnss_columns import geometry_columns, residual_columns
+from replay.stages.gnss_ins_tc import by_time, inertial_config, tight_record
+from replay.stages.inertial_columns import (
+    covariance_columns,
+    event_columns,
+    innovation_columns,
+    solution_columns,
+    state_columns,
+)
+from replay.stages.rtk import forget_epochs, join_epochs, rtk_config
+from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns, resolution_columns
+from replay.stages.rtk_ins_config import RtkInsConfig
+from replay.stages.spp import single_config
+
+Array = np.ndarray[Any, Any]
+
+_NS: Final = 1_000_000_000
+_EVENT_ROOM: Final = 4096
+_STATES: Final = tight_rtk.RTK_TIGHT_STATES
+_READ: Final = (channels.GNSS_OBS, channels.SATELLITES, channels.CORRECTIONS, channels.COARSE)
+
+
+@dataclasses.dataclass(slots=True)
+class RtkInsState:
+    """Everything that crosses from one block to the next."""
+
+    settings: RtkInsConfig
+    selection: Selection
+    config: Array
+    tight_config: Array
+    rtk_config: Array
+    filter: Array
+    kernel: Array
+    epochs: Array  # of the rover, that wait
+    rows: Array
+    base_epochs: Array
+    base_rows: Array
+    held_t: Array  # inertial samples that wait for epochs
+    held_log_t: Array
+    held_w: Array
+    held_f: Array
+    now: Array  # ns, one element: log time of the last row
+    released: Array  # ns, one element: log time of the last epoch's release
+
+
+class RtkInertial:
+    """The stage `rtk-ins-tc`."""
+
+    spec = StageSpec(
+        name="rtk-ins-tc",
+        version=1,
+        inputs=(
+            Port(channels.IMU),
+            *(Port(channel, role) for role in (RECEIVER, BASE) for channel in _READ),
+        ),
+        outputs=(
+            Port(channels.FILTER_INNOVATIONS),
+            Port(channels.FILTER_GEOMETRY),
+            Port(channels.FILTER_AMBIGUITIES),
+            Port(channels.FILTER_RESOLUTION),
+            Port(channels.FILTER_STATE),
+            Port(channels.FILTER_COVARIANCE),
+            Port(channels.FILTER_EVENTS),
+            Port(channels.SOLUTION),
+        ),
+        trigger=Port(channels.GNSS_OBS),
+    )
+
+    def start(self, config: Section, context: Context) -> RtkInsState:
+        """State before the first row."""
+        if not isinstance(config, RtkInsConfig):
+            raise TypeError("rtk-ins-tc takes an RtkInsConfig")
+        if config.rtk.motion.dynamics != "static":
+            raise ConfigurationError(
+                "rtk.motion.dynamics is the inertial system's matter here",
+                mend="leave it out, or write static",
+            )
+        if config.tight.latency < config.base.wait:
+            raise ConfigurationError(
+                f"tight.latency of {config.tight.latency} s is less than base.wait",
+                mend="inertial rows must wait at least as long as an epoch waits for the base",
+            )
+        return RtkInsState(
+            settings=config,
+            selection=select_signals(config.gnss.signals, config.gnss.systems),
+            config=inertial_config(config, context),
+            tight_config=tight_record(config),
+            rtk_config=rtk_config(config, single_config(config.gnss, config.spp)),
+            filter=records.new_state(_STATES),
+            kernel=rtk_records.new_rtk_state(),
+            epochs=np.zeros(0, dtype=EPOCH_DTYPE),
+            rows=np.zeros(0, dtype=MEASURED_DTYPE),
+            base_epochs=np.zeros(0, dtype=EPOCH_DTYPE),
+            base_rows=np.zeros(0, dtype=MEASURED_DTYPE),
+            held_t=np.zeros(0, dtype=np.int64),
+            held_log_t=np.zeros(0, dtype=np.int64),
+            held_w=np.zeros((0, 3)),
+            held_f=np.zeros((0, 3)),
+            now=np.zeros(1, dtype=np.int64),
+            released=np.zeros(1, dtype=np.int64),
+        )
+
+    def step(self, state: RtkInsState, block: Block) -> tuple[RtkInsState, Outputs]:
+        """Take a block of inertial samples and of epochs of both receivers."""
+        for role in (RECEIVER, BASE):
+            columns = [block.get(Port(channel, role).name) for channel in _READ]
+            observations = columns[0]
+            if observations is None:
+                continue
+            found = gather_epochs(observations, state.selection, *columns[1:])
+            state.now[0] = max(int(state.now[0]), int(observations.log_time_ns[-1]))
+            if role == RECEIVER:
+                state.epochs, state.rows = join_epochs(
+                    state.epochs, state.rows, found.epochs, found.rows
+                )
+            else:
+                state.base_epochs, state.base_rows = join_epochs(
+                    state.base_epochs, state.base_rows, found.epochs, found.rows
+                )
+        imu = block.get(channels.IMU.name)
+        if imu is not None:
+            latency = round(state.settings.tight.latency * _NS)
+            state.now[0] = max(int(state.now[0]), int(imu.log_time_ns[-1]))
+            state.held_t = np.concatenate([state.held_t, imu.valid_time_ns])
+            state.held_log_t = np.concatenate([state.held_log_t, imu.log_time_ns + latency])
+            state.held_w = np.concatenate([state.held_w, imu["angular_rate_body_rad_s"]])
+            state.held_f = np.concatenate([state.held_f, imu["specific_force_body_m_s2"]])
+        return state, self._run(state)
+
+    def finish(self, state: RtkInsState) -> Outputs:
+        """Nothing: what waited would be written after the log's end."""
+        return {}
+
+    def dump(self, state: RtkInsState) -> bytes:
+        """State as bytes."""
+        return dump_arrays({name: getattr(state, name) for name in _dump_types()})
+
+    def restore(self, state: RtkInsState, data: bytes) -> RtkInsState:
+        """State of a dump."""
+        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
+        return dataclasses.replace(state, **arrays)
+
+    @staticmethod
+    def _release(state: RtkInsState) -> tuple[Array, Array]:
+        """Epochs that can be used by now, and their base epochs."""
+        count = len(state.epochs)
+        partner = np.full(count, -1, dtype=np.int64)
+        release = np.zeros(count, dtype=np.int64)
+        base = state.settings.base
+        ready = rtk.match_epochs(
+            np.ascontiguousarray(state.epochs["t"]),
+            np.ascontiguousarray(state.epochs["log_t"]),
+            np.ascontiguousarray(state.base_epochs["t"]),
+            np.ascontiguousarray(state.base_epochs["log_t"]),
+            int(state.now[0]), int(state.released[0]), round(base.tolerance * _NS),
+            round(base.wait * _NS), round(base.max_age * _NS), partner, release,
+        )  # fmt: skip
+        epochs = state.epochs[:ready].copy()
+        epochs["log_t"] = release[:ready]
+        return epochs, partner[:ready]
+
+    def _run(self, state: RtkInsState) -> Outputs:
+        epochs, partner = self._release(state)
+        ready = int(np.searchsorted(state.held_log_t, int(state.now[0]), side="right"))
+        count = len(epochs)
+        end = int(epochs["first"][-1] + epochs["count"][-1]) if count else 0
+        names = state_names(
+            int(state.config["states"][0]),
+            mounting=bool(state.config["mounting"][0]),
+            lever=bool(state.config["lever"][0]),
+            squat=bool(state.config["squat"][0]),
+        )
+        states = len(names)
+        solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
+        rows = np.zeros(count, dtype=records.EPOCH_DTYPE)
+        covariances = np.zeros((count, states * (states + 1) // 2))
+        innovations = np.zeros(8 * ready + 8, dtype=records.INNOVATION_DTYPE)
+        events = np.zeros(4 * (ready + count) + _EVENT_ROOM, dtype=records.EVENT_DTYPE)
+        counts = np.zeros(5, dtype=np.int64)
+        geometry = np.zeros(count, dtype=SINGLE_ROW_DTYPE)
+        residuals = np.zeros(2 * SLOTS * end, dtype=RESIDUAL_DTYPE)
+        ambiguities = np.zeros(SLOTS * end, dtype=rtk_records.AMBIGUITY_ROW_DTYPE)
+        resolutions = np.zeros(count, dtype=rtk_records.RESOLUTION_ROW_DTYPE)
+        notes = np.zeros(count * (4 + SLOTS * rtk_records.PAIRS), dtype=NOTE_DTYPE)
+        tally = np.zeros(6, dtype=np.int64)
+        taken = tight_rtk.run_tight_rtk(
+            state.filter, state.kernel, state.config, state.tight_config, state.rtk_config,
+            np.zeros(1, dtype=records.work_dtype(_STATES)), np.zeros(1, dtype=SOLVE_DTYPE),
+            state.held_t[:ready], state.held_log_t[:ready], state.held_w[:ready],
+            state.held_f[:ready], epochs, state.rows, state.base_epochs, state.base_rows, partner,
+            (
+                solutions, rows, covariances, innovations, events, counts,
+                geometry, residuals, ambiguities, resolutions, notes, tally,
+            ),
+        )  # fmt: skip
+        if counts[4]:
+            raise DataError(
+                f"{counts[4]} events of one block found no room",
+                where=self.spec.name,
+                mend="report this with the log: what happened would not be told",
+            )
+        if taken:
+            state.released[0] = epochs["log_t"][taken - 1]
+        state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
+        state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
+        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
+        times = state.base_epochs["t"]
+        if len(times):
+            oldest = int(times.max()) - rtk.LATE_NS - round(state.settings.base.max_age * _NS)
+            state.base_epochs, state.base_rows = forget_epochs(
+                state.base_epochs, state.base_rows, int(np.argmax(times >= oldest))
+            )
+        rows, geometry = rows[: counts[1]], geometry[: tally[0]]
+        columns: dict[channels.ChannelSpec, Columns] = {
+            channels.FILTER_INNOVATIONS: by_time(
+                residual_columns(residuals[: tally[2]]),
+                innovation_columns(innovations[: counts[2]]),
+            ),
+            channels.FILTER_GEOMETRY: geometry_columns(geometry),
+            channels.FILTER_AMBIGUITIES: ambiguity_columns(ambiguities[: tally[3]]),
+            channels.FILTER_RESOLUTION: resolution_columns(resolutions[: tally[4]]),
+            channels.FILTER_STATE: state_columns(rows),
+            channels.FILTER_COVARIANCE: covariance_columns(rows, covariances[: counts[1]], names),
+            channels.FILTER_EVENTS: _events(
+                event_columns(events[: counts[3]]),
+                gnss_event_columns(notes[: tally[5]], RTK_EVENT_TEXT),
+            ),
+            channels.SOLUTION: solution_columns(solutions[: counts[0]]),
+        }
+        return {channel.name: found for channel, found in columns.items() if len(found)}
+
+
+def _events(inertial: Columns, satellites: Columns) -> Columns:
+    """Events of both kinds in the order of their log times."""
+    joined = concatenate([inertial, satellites])
+    return joined.take(np.argsort(joined.log_time_ns, kind="stable").astype(np.int64))
+
+
+def _dump_types() -> dict[str, np.dtype[Any]]:
+    return {
+        "filter": records.state_dtype(_STATES),
+        "kernel": rtk_records.RTK_STATE_DTYPE,
+        "epochs": EPOCH_DTYPE,
+        "rows": MEASURED_DTYPE,
+        "base_epochs": EPOCH_DTYPE,
+        "base_rows": MEASURED_DTYPE,
+        "held_t": np.dtype(np.int64),
+        "held_log_t": np.dtype(np.int64),
+        "held_w": np.dtype(np.float64),
+        "held_f": np.dtype(np.float64),
+        "now": np.dtype(np.int64),
+        "released": np.dtype(np.int64),
+    }
