@@ -207,6 +207,7 @@ def gather_epochs(
             epochs,
             rows,
             sights.valid_time_ns,
+            sights.log_time_ns,
             characters(sights["satellite"], 3),
             np.concatenate([sights["position_ecef_m"], sights["velocity_ecef_m_s"]], axis=1),
             np.stack(
@@ -231,6 +232,7 @@ def gather_epochs(
             epochs,
             rows,
             corrections.valid_time_ns,
+            corrections.log_time_ns,
             characters(corrections["satellite"], 3),
             characters(corrections["signal"], 2),
             np.stack([corrections[name].astype(np.float64) for name in _CORRECTED], axis=1),
@@ -247,6 +249,7 @@ def gather_epochs(
         gathering.join_coarse(
             epochs,
             coarse.valid_time_ns,
+            coarse.log_time_ns,
             np.ascontiguousarray(placed),
             coarse["satellite_count"].astype(np.int64),
         )

@@ -1,7 +1,8 @@
 """Rows of observations, sights and corrections to one record per satellite and epoch.
 
-All three channels are in the order of time and satellite; rows of one epoch share
-their valid time. The loops walk them side by side.
+All channels are in the order of log time, valid time and satellite; rows of one epoch
+share both times. The loops walk them side by side. Valid times need not rise: an epoch
+that arrives late is an epoch like any other.
 """
 
 from numba import njit
@@ -23,6 +24,18 @@ def _number(text: Array) -> tuple[int, int, int]:
         tens = 0
     prn = 10 * tens + text[2] - 48
     return system, prn, satellite_number(system, prn)
+
+
+@njit(cache=True)
+def _before(log_t: int, t: int, epoch: Record) -> bool:
+    """Whether a row of another channel stands before an epoch in the log."""
+    return log_t < epoch["log_t"] or (log_t == epoch["log_t"] and t < epoch["t"])
+
+
+@njit(cache=True)
+def _of(log_t: int, t: int, epoch: Record) -> bool:
+    """Whether a row of another channel belongs to an epoch."""
+    return log_t == epoch["log_t"] and t == epoch["t"]
 
 
 @njit(cache=True)
@@ -94,13 +107,15 @@ def gather(
     best = [0, 0, 0]
     current = -1
     epoch_t = -1
+    epoch_log_t = -1
     for i in range(t.shape[0]):
         system, prn, number = _number(satellite[i])
         if number < 0:
             counts[2] += 1
             continue
-        if counts[0] == 0 or t[i] != epoch_t:
+        if counts[0] == 0 or t[i] != epoch_t or log_t[i] != epoch_log_t:
             epoch_t = t[i]
+            epoch_log_t = log_t[i]
             epoch = epochs[counts[0]]
             epoch["t"] = t[i]
             epoch["log_t"] = log_t[i]
@@ -162,6 +177,7 @@ def join_sights(
     epochs: Array,
     rows: Array,
     t: Array,
+    log_t: Array,
     satellite: Array,
     vectors: Array,
     values: Array,
@@ -172,7 +188,7 @@ def join_sights(
     Parameters
     ----------
     epochs, rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
-    t : int64 array (n,), ns
+    t, log_t : int64 arrays (n,), ns
     satellite : uint8 array (n, 3)
     vectors : float64 array (n, 6)
         Position (m) and velocity (m/s), ECEF at reception.
@@ -185,7 +201,7 @@ def join_sights(
     n = t.shape[0]
     for e in range(epochs.shape[0]):
         epoch = epochs[e]
-        while i < n and t[i] < epoch["t"]:
+        while i < n and _before(log_t[i], t[i], epoch):
             i += 1
         k = epoch["first"]
         end = epoch["first"] + epoch["count"]
@@ -193,7 +209,7 @@ def join_sights(
         while k < end:
             row = rows[k]
             j = start
-            while j < n and t[j] == epoch["t"]:
+            while j < n and _of(log_t[j], t[j], epoch):
                 _, _, number = _number(satellite[j])
                 if number == row["satellite"]:
                     row["seen"] = 1
@@ -216,14 +232,20 @@ def join_sights(
 
 @njit(cache=True)
 def join_corrections(
-    epochs: Array, rows: Array, t: Array, satellite: Array, signal: Array, values: Array
+    epochs: Array,
+    rows: Array,
+    t: Array,
+    log_t: Array,
+    satellite: Array,
+    signal: Array,
+    values: Array,
 ) -> None:
     """Fill the terms of the corrections.
 
     Parameters
     ----------
     epochs, rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
-    t : int64 array (n,), ns
+    t, log_t : int64 arrays (n,), ns
     satellite : uint8 array (n, 3)
     signal : uint8 array (n, 2)
     values : float64 array (n, 11)
@@ -233,13 +255,13 @@ def join_corrections(
     n = t.shape[0]
     for e in range(epochs.shape[0]):
         epoch = epochs[e]
-        while i < n and t[i] < epoch["t"]:
+        while i < n and _before(log_t[i], t[i], epoch):
             i += 1
         j = i
         for k in range(epoch["first"], epoch["first"] + epoch["count"]):
             row = rows[k]
             p = j
-            while p < n and t[p] == epoch["t"]:
+            while p < n and _of(log_t[p], t[p], epoch):
                 _, _, number = _number(satellite[p])
                 if number == row["satellite"]:
                     code = signal[p, 0] + 256 * signal[p, 1]
@@ -265,13 +287,13 @@ def join_corrections(
 
 
 @njit(cache=True)
-def join_coarse(epochs: Array, t: Array, values: Array, used: Array) -> None:
+def join_coarse(epochs: Array, t: Array, log_t: Array, values: Array, used: Array) -> None:
     """Fill where each epoch was, to some metres.
 
     Parameters
     ----------
     epochs : array of EPOCH_DTYPE
-    t : int64 array (n,), ns
+    t, log_t : int64 arrays (n,), ns
     values : float64 array (n, 5)
         Position (m, ECEF), clock (m), age (s).
     used : int64 array (n,)
@@ -280,9 +302,9 @@ def join_coarse(epochs: Array, t: Array, values: Array, used: Array) -> None:
     i = 0
     for e in range(epochs.shape[0]):
         epoch = epochs[e]
-        while i < t.shape[0] and t[i] < epoch["t"]:
+        while i < t.shape[0] and _before(log_t[i], t[i], epoch):
             i += 1
-        if i < t.shape[0] and t[i] == epoch["t"]:
+        if i < t.shape[0] and _of(log_t[i], t[i], epoch):
             epoch["placed"] = 1
             for c in range(3):
                 epoch["x"][c] = values[i, c]

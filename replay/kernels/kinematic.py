@@ -19,6 +19,8 @@ from replay.kernels.single_point import (
     KIND_DOPPLER,
     KIND_PSEUDORANGE,
     SINGLE_CONFIG_DTYPE,
+    free_code,
+    free_factor,
     predicted_range_rate,
     true_time,
     usable,
@@ -57,7 +59,10 @@ KINEMATIC_STATE_DTYPE: Final = np.dtype(
 
 EVENT_CLOCK_JUMP: Final = 21
 EVENT_RESET: Final = 11
+EVENT_TIME_BACKWARD: Final = 9
+EVENT_TOO_FEW: Final = 14
 _WIDE_M2: Final = 1e8
+_WIDE_DRIFT_M2_S2: Final = 1e6
 _NAN = float("nan")
 
 
@@ -76,8 +81,26 @@ def begin(s: Record, epoch: Record) -> None:
         s["known"][k] = 0
         s["x"][_CLOCK + k] = epoch["clock"]
         s["P"][_CLOCK + k, _CLOCK + k] = _WIDE_M2
-        s["P"][_DRIFT + k, _DRIFT + k] = 1e6
+        s["P"][_DRIFT + k, _DRIFT + k] = _WIDE_DRIFT_M2_S2
     s["rejected"] = 0
+
+
+@njit(cache=True)
+def meet(s: Record, system: int, clock: float) -> None:
+    """First range of a system: its clock (m) begins there, as uncertain as at the start.
+
+    What prediction has made of a clock that nothing measured would swamp the rounding.
+    """
+    s["known"][system] = 1
+    s["x"][_CLOCK + system] = clock
+    s["x"][_DRIFT + system] = 0.0
+    P = s["P"]
+    for a in (_CLOCK + system, _DRIFT + system):
+        for j in range(STATES):
+            P[a, j] = 0.0
+            P[j, a] = 0.0
+    P[_CLOCK + system, _CLOCK + system] = _WIDE_M2
+    P[_DRIFT + system, _DRIFT + system] = _WIDE_DRIFT_M2_S2
 
 
 @njit(cache=True)
@@ -178,20 +201,23 @@ def update_epoch(
         if not usable(row, single):
             continue
         system = row["system"]
-        z = reduced_code(row, 0)
+        sigma = single["code_sigma"] * single["system_scale"][system]
+        if single["free"] == 1:
+            z = free_code(row)
+            sigma *= sqrt(free_factor(row))
+        else:
+            z = reduced_code(row, 0)
         if z != z:
             continue
         z -= geometric_range(row, x[:3], u)
         if s["known"][system] == 0:
-            s["known"][system] = 1
-            x[_CLOCK + system] = z
+            meet(s, system, z)
         for i in range(3):
             h[i] = -u[i]
             index[i] = i
         h[3] = 1.0
         index[3] = _CLOCK + system
-        scale = single["system_scale"][system]
-        variance = code_variance(row, 0, single["code_sigma"] * scale, single["weight"])
+        variance = code_variance(row, 0, sigma, single["weight"])
         out = innovations[counts[1]]
         counts[1] += 1
         offered += 1
@@ -283,9 +309,13 @@ def prepare(s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array) 
             predict(s, cfg, dt)
             s["t"] = now
             return True
+        if -cfg["gap"] <= dt <= 0.0:
+            _note(notes, counts, epoch, EVENT_TIME_BACKWARD, dt)
+            return False
         if placed:
             _note(notes, counts, epoch, EVENT_RESET, dt)
     if not placed:
+        _note(notes, counts, epoch, EVENT_TOO_FEW, float(epoch["used"]))
         return False
     begin(s, epoch)
     s["t"] = true_time(epoch["t"], epoch["clock"])

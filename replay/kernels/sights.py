@@ -11,21 +11,10 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from replay.kernels.atmosphere import (
-    BEIDOU_REFERENCE_HZ,
-    KLOBUCHAR_REFERENCE_HZ,
-    day_of_year,
-    klobuchar_b1i,
-    klobuchar_l1,
-    niell_hydrostatic,
-    niell_wet,
-    scale_ionosphere,
-    zenith_standard,
-)
+from replay.kernels.atmosphere import day_of_year
 from replay.kernels.earth import enu_axes, geodetic
-from replay.kernels.elementary import log, sin, sqrt
+from replay.kernels.elementary import sin, sqrt
 from replay.kernels.gnss_records import (
-    BEIDOU,
     GALILEO,
     SATELLITES,
     SLOTS,
@@ -41,6 +30,7 @@ from replay.kernels.orbits import (
     satellite_state,
     transmission_offset,
 )
+from replay.kernels.path_delays import model_atmosphere, zenith_delays
 from replay.kernels.sight import elevation_azimuth
 from replay.kernels.types import Array, Record
 
@@ -52,6 +42,7 @@ SIGHTS_CONFIG_DTYPE: Final = np.dtype(
         ("unhealthy", "<i8"),  # 1: use satellites that say they are unhealthy
         ("ionosphere", "<i8"),  # 0 none, 1 Klobuchar for all, 2 each system's own
         ("troposphere", "<i8"),  # 0 none, 1 Saastamoinen and Niell, 2 Saastamoinen and 1/sin
+        ("meteorology", "<i8"),  # 0 standard atmosphere, 1 MOPS, 2 GPT
         ("humidity", "<f8"),  # 0 to 1
         ("shapiro", "<i8"),
         ("fixed", "<i8"),  # 1: the antenna stands at `position`
@@ -66,6 +57,7 @@ SIGHTS_STATE_DTYPE: Final = np.dtype(
         ("x", "<f8", 3),  # m, ECEF: last coarse position
         ("clock", "<f8", SYSTEMS),  # m
         ("t", "<i8"),  # ns of the last coarse position, minus one before the first
+        ("offset", "<f8"),  # m, the receiver's clock then
         ("alpha", "<f8", (2, 4)),  # broadcast ionosphere: Klobuchar, BeiDou
         ("beta", "<f8", (2, 4)),
         ("known", "<i8", 2),  # whether the log brought one
@@ -94,11 +86,8 @@ NOTE_DTYPE: Final = np.dtype(
     align=True,
 )
 
-_EARTH_MU_M3_S2: Final = 3.986004418e14
-_DAY_S: Final = 86400
-_BEIDOU_LESS_GPS_S: Final = 14
-_UNUSABLE_DEG: Final = 0.017453292519943295  # one degree: below it nothing is modelled
 _OUTLIER_M: Final = 300.0
+_ATTEMPTS: Final = 8
 
 
 @njit(cache=True)
@@ -185,23 +174,25 @@ def locate(row: Record, message: Record, t: int, state: Array) -> bool:
     for slot in range(SLOTS):
         if row["signal"][slot] != 0:
             delay = group_delay(message, row["signal"][slot] % 256 - 48)
-            row["group_delay"][slot] = delay * SPEED_OF_LIGHT_M_S
+            # Where the message does not tell, nothing is modelled.
+            row["group_delay"][slot] = delay * SPEED_OF_LIGHT_M_S if delay == delay else 0.0
     return True
 
 
 @njit(cache=True)
-def to_reception(row: Record, x: Array, state: Array, u: Array) -> float:
+def to_reception(row: Record, sent: Array, x: Array, state: Array, u: Array) -> float:
     """Turn position and velocity into ECEF at reception; the range (m), line of sight in `u`.
 
-    `distance` and `sagnac` are filled. Two rounds of the light-time equation leave less
-    than a micrometre.
+    `sent` (6,) are both in ECEF at transmission. `distance` and `sagnac` are filled. Two
+    rounds of the light-time equation leave less than a micrometre.
     """
+    for i in range(3):
+        row["position"][i] = sent[i]
     distance = geometric_range(row, x, u)
     travel = distance / SPEED_OF_LIGHT_M_S
     for _ in range(2):
-        for i in range(3):
-            state[i] = row["position"][i]
-            state[3 + i] = row["velocity"][i]
+        for i in range(6):
+            state[i] = sent[i]
         rotate_to_reception(travel, state)
         dx, dy, dz = state[0] - x[0], state[1] - x[1], state[2] - x[2]
         travel = sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT_M_S
@@ -215,6 +206,27 @@ def to_reception(row: Record, x: Array, state: Array, u: Array) -> float:
 
 
 @njit(cache=True)
+def view(rows: Array, sent: Array, s: Record, cfg: Record, t: int, axes: Array, u: Array) -> None:
+    """What lies between the satellites of an epoch and the position of the state.
+
+    `sent` (n, 6) holds positions and velocities in ECEF at transmission; `axes` (3, 3) and
+    `u` (3,) are overwritten.
+    """
+    x = s["x"]
+    state, place = np.zeros(8), np.zeros(6)
+    place[0], place[1], place[2] = geodetic(x[0], x[1], x[2])
+    place[3] = day_of_year(t)
+    place[4], place[5] = zenith_delays(cfg, place, t)
+    enu_axes(x[0], x[1], x[2], axes)
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        if row["seen"] == 1:
+            to_reception(row, sent[k], x, state, u)
+            row["elevation"], row["azimuth"] = elevation_azimuth(axes, u[0], u[1], u[2])
+            model_atmosphere(row, x, t, s, cfg, place)
+
+
+@njit(cache=True)
 def _coarse(
     rows: Array,
     s: Record,
@@ -225,19 +237,21 @@ def _coarse(
     work: Record,
     u: Array,
 ) -> int:
-    """Position to some metres from ranges and clocks; as `iterate` answers."""
+    """Position to some metres from ranges and clocks; as `iterate` answers.
+
+    Where that fails, position and clocks stay as they were.
+    """
     n = rows.shape[0]
     x = s["x"]
+    old = s["x"].copy()
+    old_clock = s["clock"].copy()
     cold = s["t"] < 0
     for k in range(n):
         row = rows[k]
         usable = row["seen"] == 1 and row["code"][0] == row["code"][0]
         weight[k] = 1.0 if usable else 0.0
         if usable:
-            observed[k] = row["code"][0] + row["clock"]
-            delay = row["group_delay"][0]
-            if delay == delay:
-                observed[k] -= delay
+            observed[k] = row["code"][0] + row["clock"] - row["group_delay"][0]
             if not cold:
                 # What the Earth turns during the flight, to first order.
                 wx, wy = row["position"][0], row["position"][1]
@@ -246,9 +260,11 @@ def _coarse(
         for i in range(3):
             x[i] = 0.0
     status = 0
-    for attempt in range(4):
+    for attempt in range(_ATTEMPTS):
         status = iterate(rows, observed, weight, 12, 1.0, x, s["clock"], work, u)
         if status < 0:
+            s["x"][:] = old
+            s["clock"][:] = old_clock
             return status
         if cold and attempt == 0:
             # The first position brings the Earth's turn, which moves it some tens of metres.
@@ -269,54 +285,6 @@ def _coarse(
             break
         weight[place] = 0.0
     return status
-
-
-@njit(cache=True)
-def model_atmosphere(row: Record, x: Array, t: int, s: Record, cfg: Record, place: Array) -> None:
-    """Ionosphere, troposphere and relativity of the path.
-
-    `place` (4,): latitude, longitude (rad), height (m), day of year.
-    """
-    elevation = row["elevation"]
-    if elevation < _UNUSABLE_DEG:
-        return
-    latitude, longitude, height = place[0], place[1], place[2]
-    if cfg["ionosphere"] != 0:
-        second = (t // 1_000_000_000) % _DAY_S + (t % 1_000_000_000) * 1e-9
-        if cfg["ionosphere"] == 2 and row["system"] == BEIDOU and s["known"][1] == 1:
-            reference = BEIDOU_REFERENCE_HZ
-            delay = klobuchar_b1i(
-                s["alpha"][1], s["beta"][1], latitude, longitude, elevation, row["azimuth"],
-                second - _BEIDOU_LESS_GPS_S,
-            )  # fmt: skip
-        else:
-            reference = KLOBUCHAR_REFERENCE_HZ
-            delay = klobuchar_l1(
-                s["alpha"][0], s["beta"][0], latitude, longitude, elevation, row["azimuth"], second
-            )
-        for slot in range(SLOTS):
-            if row["signal"][slot] != 0:
-                row["ionosphere"][slot] = scale_ionosphere(delay, reference, row["frequency"][slot])
-    if cfg["troposphere"] != 0 and -500.0 < height < 15000.0:
-        dry, wet = zenith_standard(latitude, height, cfg["humidity"])
-        if cfg["troposphere"] == 1:
-            dry_map = niell_hydrostatic(elevation, latitude, height, place[3])
-            wet_map = niell_wet(elevation, latitude)
-        else:
-            dry_map = 1.0 / sin(elevation)
-            wet_map = dry_map
-        row["hydrostatic_mapping"] = dry_map
-        row["wet_mapping"] = wet_map
-        row["hydrostatic"] = dry * dry_map
-        row["wet"] = wet * wet_map
-    if cfg["shapiro"] == 1:
-        position = row["position"]
-        a = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-        b = sqrt(position[0] * position[0] + position[1] * position[1] + position[2] * position[2])
-        r = row["distance"] + row["sagnac"]
-        # Petit and Luzum (2010), IERS Conventions, eq. 11.17.
-        factor = 2.0 * _EARTH_MU_M3_S2 / (SPEED_OF_LIGHT_M_S * SPEED_OF_LIGHT_M_S)
-        row["shapiro"] = factor * log((a + b + r) / (a + b - r))
 
 
 @njit(cache=True)
@@ -346,9 +314,15 @@ def _place_epoch(
     weight: Array,
     work: Record,
     u: Array,
-) -> None:
-    """Say where the epoch was: the coarse position once more, now with every correction."""
-    fresh = s["t"] == epoch["t"]
+    fresh: bool,
+) -> bool:
+    """Say where the epoch was: the coarse position once more, now with every correction.
+
+    Returns
+    -------
+    bool
+        Whether the position in the state has moved by that.
+    """
     used = 0
     for k in range(rows.shape[0]):
         row = rows[k]
@@ -366,16 +340,23 @@ def _place_epoch(
     epoch["placed"] = 1
     if cfg["fixed"] == 1:
         _fixed_clock(epoch, rows, u)
-        return
-    if fresh and iterate(rows, observed, weight, 3, 1.0, epoch["x"], s["clock"], work, u) > 0:
-        for i in range(3):
-            s["x"][i] = epoch["x"][i]
-    else:
-        for i in range(3):
-            epoch["x"][i] = s["x"][i]
-    for system in range(SYSTEMS - 1, -1, -1):
-        if work["column"][system] > 0:
-            epoch["clock"] = s["clock"][system]
+        return False
+    moved = False
+    if fresh:
+        clock = s["clock"].copy()
+        if iterate(rows, observed, weight, 3, 1.0, epoch["x"], s["clock"], work, u) > 0:
+            moved = True
+            for i in range(3):
+                s["x"][i] = epoch["x"][i]
+        else:
+            for i in range(3):
+                epoch["x"][i] = s["x"][i]
+            s["clock"][:] = clock
+        for system in range(SYSTEMS - 1, -1, -1):
+            if work["column"][system] > 0:
+                s["offset"] = s["clock"][system]
+    epoch["clock"] = s["offset"]
+    return moved
 
 
 @njit(cache=True)
@@ -449,7 +430,7 @@ def run_sights(
     s, cfg, work = state[0], config[0], scratch[0]
     u = np.zeros(3)
     sat_state = np.zeros(8)
-    place = np.zeros(4)
+    sent = np.zeros((SATELLITES, 6))
     observed = np.zeros(SATELLITES)
     weight = np.zeros(SATELLITES)
     for e in range(epochs.shape[0]):
@@ -472,6 +453,7 @@ def run_sights(
                 row["seen"] = 1
         epoch = epochs[e]
         epoch["placed"] = 0
+        fresh = True
         if cfg["fixed"] == 1:
             for i in range(3):
                 s["x"][i] = cfg["position"][i]
@@ -481,10 +463,10 @@ def run_sights(
             if status > 0:
                 s["t"] = t
             else:
+                fresh = False
                 kind = EVENT_TOO_FEW if status == -1 else EVENT_NOT_CONVERGED
                 known = s["t"] >= 0 and (t - s["t"]) * 1e-9 <= cfg["coast"]
-                if status != -1 or not known:
-                    # A failed solution leaves no position to go on from.
+                if not known:
                     s["t"] = -1
                     for i in range(SYSTEMS):
                         s["clock"][i] = 0.0
@@ -492,17 +474,14 @@ def run_sights(
                     for k in range(part.shape[0]):
                         part[k]["seen"] = 0
                     continue
-        x = s["x"]
-        place[0], place[1], place[2] = geodetic(x[0], x[1], x[2])
-        place[3] = day_of_year(t)
-        enu_axes(x[0], x[1], x[2], work["axes"])
         for k in range(part.shape[0]):
-            row = part[k]
-            if row["seen"] == 1:
-                to_reception(row, x, sat_state, u)
-                row["elevation"], row["azimuth"] = elevation_azimuth(work["axes"], u[0], u[1], u[2])
-                model_atmosphere(row, x, t, s, cfg, place)
-        _place_epoch(epoch, part, s, cfg, observed, weight, work, u)
+            for i in range(3):
+                sent[k, i] = part[k]["position"][i]
+                sent[k, 3 + i] = part[k]["velocity"][i]
+        view(part, sent, s, cfg, t, work["axes"], u)
+        if _place_epoch(epoch, part, s, cfg, observed, weight, work, u, fresh):
+            # Tens of metres, without an atmosphere, are centimetres of troposphere.
+            view(part, sent, s, cfg, t, work["axes"], u)
     return taken
 
 

@@ -41,7 +41,7 @@ SINGLE_CONFIG_DTYPE: Final = np.dtype(
         ("system_scale", "<f8", SYSTEMS),  # on the deviation, by system
         ("doppler_sigma", "<f8"),  # m/s
         ("weight", WEIGHT_DTYPE),
-        ("free", "<i8"),  # 1: ionosphere-free pair of slots 0 and 1
+        ("free", "<i8"),  # 1: ionosphere-free pair of slot 0 and the next that has a range
         ("robust", "<i8"),
         ("raim", "<i8"),
         ("confidence", "<f8"),  # probability that a good epoch passes
@@ -100,19 +100,26 @@ _NAN = float("nan")
 
 
 @njit(cache=True)
+def _second(row: Record) -> int:
+    """Slot that makes a pair with slot 0: the next that has a range, else slot 1."""
+    return 2 if row["code"][1] != row["code"][1] and row["code"][2] == row["code"][2] else 1
+
+
+@njit(cache=True)
 def free_code(row: Record) -> float:
-    """Ionosphere-free pseudorange of slots 0 and 1, every modelled term taken off (m)."""
-    f0, f1 = row["frequency"][0], row["frequency"][1]
+    """Ionosphere-free pseudorange of two slots, every modelled term taken off (m)."""
+    second = _second(row)
+    f0, f1 = row["frequency"][0], row["frequency"][second]
     a = f0 * f0 / (f0 * f0 - f1 * f1)
     p0 = reduced_code(row, 0) + row["ionosphere"][0]
-    p1 = reduced_code(row, 1) + row["ionosphere"][1]
+    p1 = reduced_code(row, second) + row["ionosphere"][second]
     return a * p0 - (a - 1.0) * p1
 
 
 @njit(cache=True)
 def free_factor(row: Record) -> float:
     """Variance of the ionosphere-free pair over that of one of its ranges."""
-    f0, f1 = row["frequency"][0], row["frequency"][1]
+    f0, f1 = row["frequency"][0], row["frequency"][_second(row)]
     a = f0 * f0 / (f0 * f0 - f1 * f1)
     return a * a + (a - 1.0) * (a - 1.0)
 
@@ -143,7 +150,8 @@ def usable(row: Record, cfg: Record) -> bool:
         return False
     if not row["elevation"] >= cfg["mask"] or row["code"][0] != row["code"][0]:
         return False
-    if cfg["free"] == 1 and row["code"][1] != row["code"][1]:
+    second = row["code"][_second(row)]
+    if cfg["free"] == 1 and second != second:
         return False
     return not row["cn0"][0] < cfg["cn0_mask"]
 
@@ -235,13 +243,14 @@ def solve_epoch(
         observed[k] = _NAN
         if not usable(row, cfg):
             continue
-        scale = cfg["system_scale"][row["system"]]
-        variance[k] = code_variance(row, 0, cfg["code_sigma"] * scale, cfg["weight"])
+        sigma = cfg["code_sigma"] * cfg["system_scale"][row["system"]]
         if cfg["free"] == 1:
+            # The pair's noise is larger; orbit and troposphere are the same in both ranges.
             observed[k] = free_code(row)
-            variance[k] *= free_factor(row)
+            sigma *= sqrt(free_factor(row))
         else:
             observed[k] = reduced_code(row, 0)
+        variance[k] = code_variance(row, 0, sigma, cfg["weight"])
         if observed[k] == observed[k]:
             weight[k] = 1.0 / variance[k]
     status = iterate(rows, observed, weight, 10, 1e-4, s["x"], s["clock"], work, u)

@@ -50,7 +50,8 @@ class Atmosphere(Section, frozen=True):
         Annotated[float, quantity("1", "Klobuchar, s/semicircle^n, where the log has none")], ...
     ] = (0.0, 0.0, 0.0, 0.0)
     troposphere: Literal["none", "niell", "cosecant"] = "niell"
-    humidity: Annotated[float, quantity("1", "relative, of the standard atmosphere")] = 0.7
+    meteorology: Literal["standard", "mops", "gpt"] = "standard"
+    humidity: Annotated[float, quantity("1", "relative, at every height; not of mops")] = 0.7
     shapiro: bool = True
 
 
@@ -61,6 +62,12 @@ class Antenna(Section, frozen=True):
         Annotated[float, quantity("m", "ECEF, of the base's antenna; empty takes the log's")], ...
     ] = ()
     coast: Annotated[float, quantity("s", "an old position serves for orbits this long")] = 60.0
+    # Pipelines without inertial samples do not use it; their evaluation does.
+    lever_arm: tuple[Annotated[float, quantity("m", "body, IMU to antenna")], ...] = (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 class GnssConfig(Section, frozen=True):

@@ -45,6 +45,7 @@ Array = np.ndarray[Any, Any]
 _TEXT: Final = {
     **EVENT_TEXT,
     kinematic.EVENT_CLOCK_JUMP: "the receiver set its clock by {value:.3f} m",
+    kinematic.EVENT_TIME_BACKWARD: "an epoch {value:.3f} s after the one before is left out",
     kinematic.EVENT_RESET: "the filter begins anew after {value:.3f} s",
 }
 

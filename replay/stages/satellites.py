@@ -48,6 +48,7 @@ Array = np.ndarray[Any, Any]
 
 _IONOSPHERES: Final = ("none", "klobuchar", "system")
 _TROPOSPHERES: Final = ("none", "niell", "cosecant")
+_METEOROLOGIES: Final = ("standard", "mops", "gpt")
 _MODELS: Final = {
     ("G", int(navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR)): 0,
     ("C", int(navigation_pb2.IONOSPHERE_MODEL_BEIDOU)): 1,
@@ -250,6 +251,7 @@ def _config_record(config: GnssConfig) -> Array:
     record["unhealthy"] = int(orbits.unhealthy)
     record["ionosphere"] = _IONOSPHERES.index(atmosphere.ionosphere)
     record["troposphere"] = _TROPOSPHERES.index(atmosphere.troposphere)
+    record["meteorology"] = _METEOROLOGIES.index(atmosphere.meteorology)
     record["humidity"] = atmosphere.humidity
     record["shapiro"] = int(atmosphere.shapiro)
     record["coast"] = config.antenna.coast

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from replay.configuration import Section, quantity
-from replay.stages.gnss_config import InertialAntenna
 from replay.stages.loose_config import Alignment, Filter, Imu, NonHolonomic, Output, Stops
 from replay.stages.tdcp_config import TdcpConfig
 
@@ -40,7 +39,6 @@ class TdcpInsConfig(TdcpConfig, frozen=True):
     """Settings of `tdcp-ins`."""
 
     name: str = "tdcp-ins"
-    antenna: InertialAntenna = InertialAntenna()
     tdcp_ins: TdcpIns = TdcpIns()
     filter: Filter = Filter()
     alignment: Alignment = Alignment()

@@ -35,6 +35,11 @@ SOLUTION, RESIDUALS, CLOCKS, GEOMETRY, EVENTS = (
     )
 )
 
+TERMS = (
+    "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m",
+    "ionosphere_m", "hydrostatic_m", "wet_m",
+)  # fmt: skip
+
 Inputs = dict[str, Columns]
 
 
@@ -129,3 +134,17 @@ def edited(columns: Columns, **fields: np.ndarray) -> Columns:
 def times_of(columns: Columns) -> np.ndarray:
     """Valid times, each once."""
     return np.unique(columns.valid_time_ns)
+
+
+def satellites(inputs: Inputs, *tables: Mapping[str, Any]) -> Inputs:
+    """Outputs of the stage `satellites`."""
+    return run(Satellites(), spp_config(*tables), inputs).outputs
+
+
+def keyed(
+    columns: Columns, name: str, *, signal: bool = True
+) -> dict[tuple[int, bytes, bytes], float]:
+    """Values of a field by time, satellite and signal."""
+    second = columns["signal"].tolist() if signal else [b""] * len(columns)
+    keys = zip(columns.valid_time_ns.tolist(), columns["satellite"].tolist(), second, strict=True)
+    return dict(zip(keys, columns[name].tolist(), strict=True))

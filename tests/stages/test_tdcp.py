@@ -14,11 +14,12 @@ from replay.log import codec
 from replay.log.columns import Columns, concatenate
 from replay.schemas import sights_pb2, solution_pb2
 from replay.stages.base import Context
+from replay.stages.gnss_config import Antenna
 from replay.stages.satellites import Satellites
 from replay.stages.tdcp import TimeDifferencedPhase
 from replay.stages.tdcp_config import Tdcp, TdcpConfig
 from replay.stages.tdcp_ins import TdcpInertial
-from replay.stages.tdcp_ins_config import InertialAntenna, TdcpIns, TdcpInsConfig
+from replay.stages.tdcp_ins_config import TdcpIns, TdcpInsConfig
 from tests.simulate.observing import NO_AIR, START_NS, make, receiver
 
 LEVER = (-0.4, 0.15, -1.2)
@@ -160,7 +161,7 @@ def test_slips_that_were_not_told_are_taken_off():
 def test_blocks_and_dumps_change_nothing():
     made = drive()
     stages = lambda: [Satellites(), TimeDifferencedPhase(), TdcpInertial()]  # noqa: E731
-    config = TdcpInsConfig(antenna=InertialAntenna(lever_arm=LEVER))
+    config = TdcpInsConfig(antenna=Antenna(lever_arm=LEVER))
     whole = Through(made.rows, stages(), config)
     cuts = [START_NS + round(t * NS) for t in (3.2, 15.0, 15.004, 22.7, 22.75, 31.0, 31.0001, 40.0)]
     pieces = Through(made.rows, stages(), config, cuts=cuts, freeze=True)
@@ -194,7 +195,7 @@ def changes(made, run):
 def test_the_inertial_system_moves_as_the_vehicle(measurement):
     made = drive()
     config = TdcpInsConfig(
-        antenna=InertialAntenna(lever_arm=LEVER),
+        antenna=Antenna(lever_arm=LEVER),
         tdcp_ins=TdcpIns(measurement=measurement, velocity=measurement == "position"),
     )
     run = Through(made.rows, [Satellites(), TimeDifferencedPhase(), TdcpInertial()], config)
@@ -228,7 +229,7 @@ def test_the_inertial_system_carries_the_place_over_a_break():
         log_time_ns=obs.log_time_ns,
         present={name: obs.is_present(name) for name in values},
     )
-    config = TdcpInsConfig(antenna=InertialAntenna(lever_arm=LEVER), tdcp=Tdcp(max_gap=2.0))
+    config = TdcpInsConfig(antenna=Antenna(lever_arm=LEVER), tdcp=Tdcp(max_gap=2.0))
     run = Through(rows, [Satellites(), TimeDifferencedPhase(), TdcpInertial()], config)
     chain = run["tdcp.SOLUTION"]
     restarts = np.flatnonzero(chain["status"] == STATUS("SOLUTION_STATUS_SINGLE"))
