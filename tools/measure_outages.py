@@ -1,7 +1,9 @@
-"""Drift of `gnss-ins-lc` at the end of 15 s outages whose windows are shifted through a log.
+"""Drift of a filter at the end of outages whose windows are shifted through a log.
 
 Run: `python tools/measure_outages.py LOG [--step SECONDS] [--set key=value ...]`. The windows
-are those of the README: the first 40 s after the first row, one every 45 s.
+are those of the README: 15 s, the first 40 s after the first row, one every 45 s.
+`--pipeline gnss-ins-tc --keep 3` leaves the three best satellites of each outage (see
+`replay degrade --help`), so that what few satellites are worth can be compared with none.
 """
 
 import argparse
@@ -22,25 +24,44 @@ def main() -> None:
     """Print median, 99th percentile and worst horizontal drift over all shifts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("log", type=Path)
+    parser.add_argument("--pipeline", default="gnss-ins-lc")
+    parser.add_argument("--begin", type=float, default=40.0, help="first outage, s after first row")
+    parser.add_argument("--length", type=float, default=15.0, help="seconds of an outage")
+    parser.add_argument("--every", type=float, default=45.0, help="seconds between outages")
+    parser.add_argument("--leave-last", type=float, default=30.0, help="seconds that stay whole")
+    parser.add_argument("--keep", default="", help="number or names of satellites that stay")
     parser.add_argument("--step", type=float, default=1.0, help="seconds between shifts")
+    parser.add_argument("--fixed-truth-only", action="store_true", help="as of replay evaluate")
     parser.add_argument("--set", action="append", default=[], help="as of replay run")
     arguments = parser.parse_args()
-    drifts: list[float] = []
+    keep = f",keep={arguments.keep}" if arguments.keep else ""
+    drifts: list[tuple[float, float]] = []
+    unknown = 0
     with tempfile.TemporaryDirectory() as scratch:
         cut, run = Path(scratch) / "cut.mcap", Path(scratch) / "run.mcap"
-        for shift in np.arange(0.0, 45.0, arguments.step).tolist():
-            window = f"{40.0 + shift},15"
-            planned = plan_outages(arguments.log, [window], every_s=45.0, leave_last_s=30.0)
+        for shift in np.arange(0.0, arguments.every, arguments.step).tolist():
+            planned = plan_outages(
+                arguments.log,
+                [f"{arguments.begin + shift},{arguments.length:g}{keep}"],
+                every_s=arguments.every,
+                leave_last_s=arguments.leave_last,
+            )
             remove_fixes(arguments.log, cut, planned)
             with LogReader(cut) as reader:
                 tables = [parse_assignments(arguments.set)]
-                replay_log(reader, run, make_job(reader, "gnss-ins-lc", tables=tables))
-            found = [outage.horizontal_drift_m for outage in evaluate_run(run).outages]
-            drifts += [drift for drift in found if drift is not None]
-    print(
-        f"{len(drifts)} outages, horizontal drift: median {np.median(drifts):.2f} m, "
-        f"99 % {np.percentile(drifts, 99):.2f} m, worst {max(drifts):.2f} m"
-    )
+                replay_log(reader, run, make_job(reader, arguments.pipeline, tables=tables))
+            for outage in evaluate_run(run, fixed_truth_only=arguments.fixed_truth_only).outages:
+                if outage.horizontal_drift_m is None or outage.drift_3d_m is None:
+                    unknown += 1
+                else:
+                    drifts.append((outage.horizontal_drift_m, outage.drift_3d_m))
+    print(f"{len(drifts)} outages of {arguments.length:g} s, {unknown} more without truth")
+    for name, values in zip(("horizontal", "3d"), np.array(drifts).reshape(-1, 2).T, strict=True):
+        print(
+            f"{name} drift: median {np.median(values):.2f} m, "
+            f"rms {np.sqrt(np.mean(values * values)):.2f} m, "
+            f"99 % {np.percentile(values, 99):.2f} m, worst {values.max():.2f} m"
+        )
 
 
 if __name__ == "__main__":

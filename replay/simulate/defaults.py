@@ -8,11 +8,12 @@ what follows from the scenario is said; the rest is left to the pipeline.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from replay.configuration import STANDARD_GRAVITY_M_S2, Table, merge
 from replay.simulate.scenario import Settings, tables_toml
+from replay.simulate.sky import Receiver
 
 # What is left to a perfect unit: a filter needs some noise, and integration has its own.
 _LEAST_GYRO_NOISE: Final = 1e-7  # rad/sqrt(s)
@@ -100,9 +101,20 @@ def fitting_defaults(settings: Settings) -> Table:
     }
 
 
-def defaults_toml(settings: Settings, over: Mapping[str, Any] | None = None) -> str:
-    """Canonical TOML of :func:`fitting_defaults`, with tables that go over it."""
+def defaults_toml(
+    settings: Settings, over: Mapping[str, Any] | None = None, receivers: Sequence[Receiver] = ()
+) -> str:
+    """Canonical TOML of :func:`fitting_defaults`, with tables that go over it.
+
+    Of `receivers` the one that `over` names in its section `gnss`, or the first that rides
+    on the vehicle, tells where the antenna stands.
+    """
     tables = fitting_defaults(settings)
+    named = (over or {}).get("gnss", {}).get("receiver", "")
+    riding = [receiver for receiver in receivers if receiver.kind == "vehicle"]
+    riding.sort(key=lambda receiver: receiver.name != named)
+    if riding:
+        tables["antenna"] = {"lever_arm": riding[0].lever_arm}
     merge(tables, over or {})
     return tables_toml(tables)
 

@@ -268,7 +268,7 @@ class _Part:
                 }
             )
         begin = np.flatnonzero(carrier & (table["lock_s"] == 0.0))
-        until = np.append(begin[1:], len(table))
+        until = np.append(begin, len(table))[1:]
         held = np.flatnonzero(carrier)
         for first, after in zip(begin.tolist(), until.tolist(), strict=True):
             last = held[np.searchsorted(held, after) - 1]

@@ -79,7 +79,7 @@ def write_log(scenario: Scenario, out: Path) -> SimulationResult:
     with LogWriter(out) as writer:
         for topic in rows:
             writer.add_channel(topic, _message(topic))
-        defaults = defaults_toml(scenario.settings, scenario.defaults)
+        defaults = defaults_toml(scenario.settings, scenario.defaults, scenario.setup.receivers)
         writer.add_metadata(DEFAULTS, {"toml": defaults})
         if told:
             writer.add_metadata(SIMULATED, told)

@@ -99,20 +99,11 @@ class TightInertial:
         """State before the first row."""
         if not isinstance(config, TightConfig):
             raise TypeError("gnss-ins-tc takes a TightConfig")
-        inertial = LooseConfig(
-            filter=config.filter,
-            alignment=config.alignment,
-            gnss=Gnss(outage_limit=config.tight.outage_limit),
-            stops=config.stops,
-            non_holonomic=config.non_holonomic,
-            imu=config.imu,
-            output=config.output,
-        )
         return TightState(
             settings=config,
             selection=select_signals(config.gnss.signals, config.gnss.systems),
-            config=config_record(inertial, context),
-            tight_config=_tight_record(config),
+            config=inertial_config(config, context),
+            tight_config=tight_record(config),
             filter=records.new_state(_STATES),
             tight=tight_records.new_tight_state(),
             epochs=np.zeros(0, dtype=EPOCH_DTYPE),
@@ -213,7 +204,7 @@ class TightInertial:
         state.epochs["first"] -= used
         epochs, satellites = epochs[: counts[1]], satellites[: tally[1]]
         outputs = {
-            channels.FILTER_INNOVATIONS: _by_time(
+            channels.FILTER_INNOVATIONS: by_time(
                 residual_columns(residuals[: tally[0]]),
                 innovation_columns(innovations[: counts[2]]),
             ),
@@ -227,7 +218,7 @@ class TightInertial:
         return {channel.name: rows for channel, rows in outputs.items() if len(rows)}
 
 
-def _by_time(satellites: Columns, constraints: Columns) -> Columns:
+def by_time(satellites: Columns, constraints: Columns) -> Columns:
     """Innovations of satellites and of constraints in the order of their log times."""
     joined = concatenate([satellites, constraints])
     return joined.take(np.argsort(joined.log_time_ns, kind="stable").astype(np.int64))
@@ -246,18 +237,20 @@ def _dump_types() -> dict[str, np.dtype[Any]]:
     }
 
 
-def _tight_record(config: TightConfig) -> Array:
+def tight_record(config: TightConfig) -> Array:
+    """Settings of the satellites' part as the record that the compiled loop reads."""
     own = config.tight
-    if len(own.lever_arm) != 3:
+    lever_arm = config.antenna.lever_arm
+    if len(lever_arm) != 3:
         raise ConfigurationError(
-            f"tight.lever_arm has {len(own.lever_arm)} numbers",
+            f"antenna.lever_arm has {len(lever_arm)} numbers",
             mend="give forward, right, down of the antenna from the IMU",
         )
     record = np.zeros(1, dtype=tight_records.TIGHT_CONFIG_DTYPE)
     record["single"] = single_config(config.gnss, config.spp)
     record["single"]["code_sigma"] = own.code_sigma
     record["single"]["doppler_sigma"] = own.doppler_sigma
-    record["lever"] = own.lever_arm
+    record["lever"] = lever_arm
     for name in ("code", "doppler", "phase"):
         record[name] = int(getattr(own, name))
     for name in (
@@ -266,3 +259,17 @@ def _tight_record(config: TightConfig) -> Array:
     ):
         record[name] = getattr(own, name)
     return record
+
+
+def inertial_config(config: TightConfig, context: Context) -> Array:
+    """Settings of the inertial part, as the record of the loosely coupled filter."""
+    inertial = LooseConfig(
+        filter=config.filter,
+        alignment=config.alignment,
+        gnss=Gnss(outage_limit=config.tight.outage_limit),
+        stops=config.stops,
+        non_holonomic=config.non_holonomic,
+        imu=config.imu,
+        output=config.output,
+    )
+    return config_record(inertial, context)

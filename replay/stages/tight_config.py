@@ -19,11 +19,6 @@ from replay.stages.spp_config import Spp, SppConfig
 class Tight(Section, frozen=True):
     """How the satellites of an epoch are used on the inertial system."""
 
-    lever_arm: tuple[Annotated[float, quantity("m", "body, IMU to antenna")], ...] = (
-        0.0,
-        0.0,
-        0.0,
-    )
     code: bool = True
     doppler: bool = True
     phase: bool = False

@@ -1,4 +1,4 @@
-"""Taking fixes away: those of the stretch, and nothing else."""
+"""Taking fixes and observations away: those of the stretch, and nothing else."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from replay.engine.degrade import DEGRADE, Outage, remove_fixes
+from replay import channels
+from replay.engine.degrade import DEGRADE, Outage, plan_outages, remove_fixes
+from replay.engine.job import make_job
 from replay.engine.manifest import read_manifest
+from replay.engine.run import replay_log
 from replay.errors import UsageError
+from replay.log.columns import Columns
 from replay.log.reader import LogReader
+from replay.simulate import read_scenario, write_log
 from tests.engine.drives import EVENTS, FIX, IMU, SECOND, SOLUTION, TRACE, TRUTH, run_to_file
+from tests.simulate import observing
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +115,118 @@ def test_a_run_can_be_degraded(short_run: Path, start_ns: int, tmp_path: Path) -
         }
         assert after.channels[SOLUTION].depth == 1
         assert after.channels[TRACE].depth == 2
+
+
+# Observations
+
+
+OBSERVATIONS = channels.GNSS_OBS.at(receiver="rover")
+BASE = channels.GNSS_OBS.at(receiver="base")
+
+
+@pytest.fixture(scope="module")
+def observed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a minute at rest: a rover with fixes, a base, GPS and Galileo."""
+    path = tmp_path_factory.mktemp("observed") / "in.mcap"
+    rover = observing.receiver(signals=["G1C", "G2W", "E1C"])
+    table = {
+        "start": {"time": observing.START, **observing.HERE},
+        "receivers": [rover, observing.base(signals=["G1C"])],
+        "segments": [{"kind": "hold", "duration": 30.0}],
+        "defaults": {"gnss": {"receiver": "rover", "base": "base"}},
+    }
+    write_log(read_scenario(table), path)
+    return path
+
+
+def names_between(columns: Columns, outage: Outage) -> set[str]:
+    inside = (columns.valid_time_ns >= outage.start_ns) & (columns.valid_time_ns < outage.end_ns)
+    return {name.decode() for name in columns["satellite"][inside].tolist()}
+
+
+def test_a_full_outage_takes_observations_of_the_rover_alone(
+    observed: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "out.mcap"
+    (cut,) = plan_outages(observed, ["10,5"])
+    removed = remove_fixes(observed, target, [cut])
+    assert set(removed) == {OBSERVATIONS, FIX}
+    with LogReader(observed) as before, LogReader(target) as after:
+        old, new = before.read(OBSERVATIONS), after.read(OBSERVATIONS)
+        inside = (old.valid_time_ns >= cut.start_ns) & (old.valid_time_ns < cut.end_ns)
+        assert removed[OBSERVATIONS] == inside.sum() > 0
+        assert new.valid_time_ns.tolist() == old.valid_time_ns[~inside].tolist()
+        for topic in set(before.channels) - {OBSERVATIONS, FIX}:
+            assert after.digests()[topic] == before.digests()[topic]
+
+
+def test_the_strongest_satellites_stay(observed: Path, tmp_path: Path) -> None:
+    """Of a log without elevations: those with the largest C/N0 at the outage's first epoch."""
+    target = tmp_path / "out.mcap"
+    first, second = plan_outages(observed, ["5,5,keep=3", "20,5,keep=4"])
+    remove_fixes(observed, target, [first, second])
+    with LogReader(observed) as before, LogReader(target) as after:
+        old, new = before.read(OBSERVATIONS), after.read(OBSERVATIONS)
+        assert len(after.read(FIX)) < len(before.read(FIX))
+        told = json.loads(after.metadata[DEGRADE]["json"])["outages"]
+    for cut, count, tell in ((first, 3, told[0]), (second, 4, told[1])):
+        kept = names_between(new, cut)
+        assert len(kept) == count == len(cut.keep)
+        assert kept == set(cut.keep)
+        assert tell["keep"] == list(cut.keep)
+        now = old.valid_time_ns == old.valid_time_ns[old.valid_time_ns >= cut.start_ns].min()
+        strength = {}
+        for name, value in zip(old["satellite"][now], old["cn0_dbhz"][now], strict=True):
+            strength[name.decode()] = max(value, strength.get(name.decode(), 0.0))
+        weakest = min(strength[name] for name in kept)
+        assert all(strength[name] <= weakest for name in set(strength) - kept)
+        # Nothing of what stays is missing.
+        mine = (old.valid_time_ns >= cut.start_ns) & (old.valid_time_ns < cut.end_ns)
+        mine &= np.isin(old["satellite"], np.array(cut.keep, dtype="S3"))
+        rest = (new.valid_time_ns >= cut.start_ns) & (new.valid_time_ns < cut.end_ns)
+        assert rest.sum() == mine.sum()
+
+
+def test_the_highest_satellites_stay_where_the_log_has_elevations(
+    observed: Path, tmp_path: Path
+) -> None:
+    run = tmp_path / "run.mcap"
+    with LogReader(observed) as reader:
+        replay_log(reader, run, make_job(reader, "spp", tables=[]))
+    (cut,) = plan_outages(run, ["12,3,keep=3"])
+    with LogReader(run) as reader:
+        rows = reader.read(channels.SATELLITES.at(receiver="rover"))
+    now = rows.valid_time_ns == rows.valid_time_ns[rows.valid_time_ns >= cut.start_ns].min()
+    order = np.argsort(-rows["elevation_rad"][now])[:3]
+    assert [name.decode() for name in rows["satellite"][now][order]] == list(cut.keep)
+
+
+def test_named_satellites_stay(observed: Path, tmp_path: Path) -> None:
+    with LogReader(observed) as reader:
+        names = sorted(names_between(reader.read(OBSERVATIONS), Outage(0, 2**62)))
+    cuts = plan_outages(observed, [f"5,2,keep={names[0]}+{names[-1]}"], every_s=10.0)
+    assert [cut.keep for cut in cuts] == [(names[0], names[-1])] * 3
+    remove_fixes(observed, tmp_path / "out.mcap", cuts)
+    with LogReader(tmp_path / "out.mcap") as reader:
+        rows = reader.read(OBSERVATIONS)
+    assert [names_between(rows, cut) for cut in cuts] == [{names[0], names[-1]}] * 3
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("10,5,keep=0", "neither a number"),
+        ("10,5,keep=G5", "neither a number"),
+        ("10,5,keep=", "neither a number"),
+        ("5000,5,keep=3", "no observation to keep"),
+        ("10,keep=3", "no outage"),
+    ],
+)
+def test_what_cannot_be_kept(observed: Path, text: str, what: str) -> None:
+    with pytest.raises(UsageError, match=what):
+        plan_outages(observed, [text])
+
+
+def test_there_are_no_satellites_in_fixes(short_log: Path) -> None:
+    with pytest.raises(UsageError, match="0 channels of observations"):
+        plan_outages(short_log, ["10,5,keep=3"])
