@@ -14,6 +14,11 @@ demo: $(STAMP)
 	$(BIN)/replay evaluate $(OUT)/run.mcap
 	$(BIN)/replay report $(OUT)/run.mcap -o $(OUT)/report.html
 	$(BIN)/replay verify $(OUT)/run.mcap --input $(OUT)/input.mcap
+	$(BIN)/replay simulate recordings/tang-short/scenario.toml -o $(OUT)/town.mcap
+	for method in spp tdcp-ins rtk; do \
+	  $(BIN)/replay run $$method $(OUT)/town.mcap -o $(OUT)/town-$$method.mcap || exit; done
+	$(BIN)/replay compare $(OUT)/town-spp.mcap $(OUT)/town-tdcp-ins.mcap $(OUT)/town-rtk.mcap \
+	  -o $(OUT)/methods.html --rrd $(OUT)/methods.rrd
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto

@@ -30,8 +30,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     console.print(_error_table("at all rows", _at_all(evaluation)))
     if evaluation.solution_of != "imu":
         console.print(
-            "[dim]position: rows without attitude are about an antenna; truth is moved there where its"
-            " lever arm and the truth's attitude are known[/dim]"
+            "[dim]position: rows without attitude are about an antenna; truth is moved there where"
+            " its lever arm and the truth's attitude are known[/dim]"
         )
     _print_gnss(evaluation, console)
     if evaluation.outages:

@@ -21,7 +21,7 @@ from replay.kernels.earth import enu_axes
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.gnss_update import mark_epoch
-from replay.kernels.kalman import scalar_update
+from replay.kernels.kalman import cholesky3, scalar_update
 from replay.kernels.loose import NOTE_EARLY, NOTE_FIX
 from replay.kernels.output_rows import emit_epoch, emit_solution
 from replay.kernels.prediction import advance, remove_sensor_errors
@@ -29,6 +29,7 @@ from replay.kernels.records import (
     EVENT_OUTAGE_END,
     EVENT_TIME_BACKWARD,
     FIX_DTYPE,
+    MAX_STATES,
     RUNNING,
     STATUS_OUTAGE,
     STATUS_PREDICTED,
@@ -66,8 +67,8 @@ from replay.kernels.types import Array, Record
 from replay.kernels.update import feed_back, record_event, state_count
 
 LEAD: Final = 3
-RTK_TIGHT_STATES: Final = 180
-"""Error states at most."""
+RTK_TIGHT_STATES: Final = MAX_STATES + ROOM - LEAD
+"""Error states at most: those of the inertial system, and of the differences all but position."""
 _LEAST_DIFFERENCES: Final = 4
 _NAN = float("nan")
 
@@ -365,7 +366,7 @@ def use_differences(
     shown = status if status > 0 else STATUS_PREDICTED
     emit_solution(s, work, shown, log_t, solutions, counts)
     if status == FIXED and not held:
-        _show_fixed(s, work, tries[0], room[10], solutions[counts[0] - 1])
+        show_fixed(s, work, tries[0], x, P, room[10], solutions[counts[0] - 1])
     emit_epoch(s, cfg, log_t, states, covariances, counts)
     row = gnss[tally[0]]
     tally[0] += 1
@@ -379,12 +380,53 @@ def use_differences(
 
 
 @njit(cache=True)
-def _show_fixed(s: Record, work: Record, tried: Record, arm: Array, row: Record) -> None:
-    """The solution's position given the integers, which the filter itself does not keep."""
-    axes, N = work["axes"], tried["cov"]
+def show_fixed(
+    s: Record, work: Record, tried: Record, x: Array, A: Array, arm: Array, row: Record
+) -> None:
+    """The solution's position given the integers, which the filter itself does not keep.
+
+    With r and a the positions of the inertial unit and of the antenna, and N the covariance
+    of the antenna's once the integers are known, r + K (a_fixed - a) and
+    P_rr - K (P_aa - N) K', where K = P_ra P_aa^-1.
+
+    Parameters
+    ----------
+    s, work : records
+    tried : record of ATTEMPT_DTYPE
+    x, A : float64 arrays
+        Float states and covariance, that of the antenna first.
+    arm : float64 array (3,), m
+        Lever arm, ECEF.
+    row : record of SOLUTION_DTYPE
+        Changed.
+    """
+    axes, P, N, K, L = work["axes"], s["P"], work["N"], work["M"], work["L"]
+    for i in range(3):
+        for j in range(3):
+            K[i, j] = 1.0 if i == j else 0.0
+    if cholesky3(A, 3, L):
+        for i in range(3):
+            p, q = POSITION + i, ATTITUDE
+            c0, c1, c2 = cross3(P[p, q], P[p, q + 1], P[p, q + 2], arm[0], arm[1], arm[2])
+            y0 = (P[p, POSITION] + c0) / L[0, 0]
+            y1 = (P[p, POSITION + 1] + c1 - L[1, 0] * y0) / L[1, 1]
+            y2 = (P[p, POSITION + 2] + c2 - L[2, 0] * y0 - L[2, 1] * y1) / L[2, 2]
+            K[i, 2] = y2 / L[2, 2]
+            K[i, 1] = (y1 - L[2, 1] * K[i, 2]) / L[1, 1]
+            K[i, 0] = (y0 - L[1, 0] * K[i, 1] - L[2, 0] * K[i, 2]) / L[0, 0]
+    r = s["nav"]["r"]
+    for a in range(3):
+        row["r"][a] = r[a]
+        for i in range(3):
+            row["r"][a] += K[a, i] * (tried["x"][i] - x[i])
+        for b in range(3):
+            total = P[POSITION + a, POSITION + b]
+            for i in range(3):
+                for j in range(3):
+                    total -= K[a, i] * (A[i, j] - tried["cov"][i, j]) * K[b, j]
+            N[a, b] = total
     place = 0
     for a in range(3):
-        row["r"][a] = tried["x"][a] - arm[a]
         for b in range(a, 3):
             total = 0.0
             for i in range(3):
@@ -431,6 +473,8 @@ def _take_epochs(
             heed_breaks(part, 0, q)
             continue
         elif at < s["t"]:
+            # What it says of breaks is true of the phases after it all the same.
+            heed_breaks(part, 0, q)
             late = (s["t"] - at) * 1e-9
             record_event(events, counts, epoch["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
             continue

@@ -2,8 +2,42 @@
 
 from __future__ import annotations
 
-from replay.stages.rtk_config import Ambiguities, Base, Motion, Rtk
+from typing import Annotated, Literal
+
+from replay.configuration import quantity
+from replay.stages.rtk_config import Ambiguities, Base, Differences, Motion, Rtk
 from replay.stages.tight_config import Tight, TightConfig
+
+# Sections of their own, not other values of the shared ones: a table that sets one key of a
+# section takes the section's own defaults for the rest.
+
+
+class PatientTight(Tight, frozen=True):
+    """Inertial rows wait for the base."""
+
+    latency: Annotated[float, quantity("s", "inertial rows wait this long for an epoch")] = 0.6
+
+
+class CarriedMotion(Motion, frozen=True):
+    """The inertial system carries the position."""
+
+    dynamics: Literal["static"] = "static"
+
+
+class HeldAmbiguities(Ambiguities, frozen=True):
+    """Integers are fed back soon: the inertial system bridges what breaks them."""
+
+    mode: Literal["instantaneous", "continuous", "fix-and-hold", "float"] = "fix-and-hold"
+    hold_count: int = 3
+    proven: int = 3
+
+
+class InertialRtk(Rtk, frozen=True):
+    """Relative positioning on an inertial system."""
+
+    differences: Differences = Differences()
+    motion: CarriedMotion = CarriedMotion()
+    ambiguities: HeldAmbiguities = HeldAmbiguities()
 
 
 class RtkInsConfig(TightConfig, frozen=True):
@@ -16,9 +50,6 @@ class RtkInsConfig(TightConfig, frozen=True):
     """
 
     name: str = "rtk-ins-tc"
-    tight: Tight = Tight(latency=0.6)
+    tight: PatientTight = PatientTight()
     base: Base = Base()
-    rtk: Rtk = Rtk(
-        motion=Motion(dynamics="static"),
-        ambiguities=Ambiguities(mode="fix-and-hold", hold_count=3, proven=3),
-    )
+    rtk: InertialRtk = InertialRtk()

@@ -53,6 +53,7 @@ Array = np.ndarray[Any, Any]
 
 _NS: Final = 1_000_000_000
 _EVENT_ROOM: Final = 4096
+_NEVER: Final = -(2**62)
 _STATES: Final = tight_rtk.RTK_TIGHT_STATES
 _READ: Final = (channels.GNSS_OBS, channels.SATELLITES, channels.CORRECTIONS, channels.COARSE)
 
@@ -107,11 +108,6 @@ class RtkInertial:
         """State before the first row."""
         if not isinstance(config, RtkInsConfig):
             raise TypeError("rtk-ins-tc takes an RtkInsConfig")
-        if config.rtk.motion.dynamics != "static":
-            raise ConfigurationError(
-                "rtk.motion.dynamics is the inertial system's matter here",
-                mend="leave it out, or write static",
-            )
         if config.tight.latency < config.base.wait:
             raise ConfigurationError(
                 f"tight.latency of {config.tight.latency} s is less than base.wait",
@@ -179,19 +175,28 @@ class RtkInertial:
 
     @staticmethod
     def _release(state: RtkInsState) -> tuple[Array, Array]:
-        """Epochs that can be used by now, and their base epochs."""
+        """Epochs that can be used by now, and their base epochs.
+
+        An epoch that is still without its base's when its wait is over is ready then, row or
+        no row: the inertial rows go on, and what they have passed comes too late.
+        """
         count = len(state.epochs)
         partner = np.full(count, -1, dtype=np.int64)
         release = np.zeros(count, dtype=np.int64)
         base = state.settings.base
+        wait = round(base.wait * _NS)
+        times = np.concatenate([state.base_epochs["t"], np.full(count, _NEVER)])
+        arrivals = np.concatenate([state.base_epochs["log_t"], state.epochs["log_t"] + wait])
+        order = np.argsort(arrivals, kind="stable").astype(np.int64)
         ready = rtk.match_epochs(
             np.ascontiguousarray(state.epochs["t"]),
             np.ascontiguousarray(state.epochs["log_t"]),
-            np.ascontiguousarray(state.base_epochs["t"]),
-            np.ascontiguousarray(state.base_epochs["log_t"]),
+            times[order], arrivals[order],
             int(state.now[0]), int(state.released[0]), round(base.tolerance * _NS),
-            round(base.wait * _NS), round(base.max_age * _NS), partner, release,
+            wait, round(base.max_age * _NS), partner, release,
         )  # fmt: skip
+        found = partner >= 0
+        partner[found] = order[partner[found]]
         epochs = state.epochs[:ready].copy()
         epochs["log_t"] = release[:ready]
         return epochs, partner[:ready]
@@ -243,7 +248,9 @@ class RtkInertial:
         state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
         times = state.base_epochs["t"]
         if len(times):
-            oldest = int(times.max()) - rtk.LATE_NS - round(state.settings.base.max_age * _NS)
+            # Epochs that wait for inertial samples ask for old ones of the base.
+            oldest = min(int(times.max()), int(state.epochs["t"].min(initial=times.max())))
+            oldest -= rtk.LATE_NS + round(state.settings.base.max_age * _NS)
             state.base_epochs, state.base_rows = forget_epochs(
                 state.base_epochs, state.base_rows, int(np.argmax(times >= oldest))
             )

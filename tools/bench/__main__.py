@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from rich.console import Console
 
-from tools.bench import formats, replaying
+from tools.bench import formats, gnss, replaying
 from tools.bench.row import Row, summary
 
 BENCHES: dict[str, Callable[..., list[Row]]] = {
@@ -23,6 +23,7 @@ BENCHES: dict[str, Callable[..., list[Row]]] = {
     "filter": replaying.bench_filter,
     "view": formats.bench_view,
     "diff": formats.bench_diff,
+    "gnss": gnss.bench_gnss,
     "importers": formats.bench_importers,
     "elementary": formats.bench_elementary,
 }
