@@ -157,6 +157,11 @@ def _prepare(cls: type[Section], table: Mapping[str, Any], path: tuple[str, ...]
     """Check keys and turn quantities into SI numbers."""
     hints = get_type_hints(cls, include_extras=True)
     prepared: Table = {}
+    defaults = {
+        field.name: field.default
+        for field in msgspec.structs.fields(cls)
+        if isinstance(field.default, Section)
+    }
     for key, value in table.items():
         name = ".".join((*path, key))
         if key not in hints:
@@ -164,6 +169,11 @@ def _prepare(cls: type[Section], table: Mapping[str, Any], path: tuple[str, ...]
             hint = f"did you mean {'.'.join((*path, near[0]))}?" if near else ""
             known = f"known here: {', '.join(hints)}"
             raise ConfigurationError(f"unknown key {name}", mend=f"{hint} {known}".strip())
+        if key in defaults and isinstance(value, Mapping):
+            # What is not said stays as this table has it, not as its own class does.
+            whole: Table = msgspec.to_builtins(defaults[key])
+            merge(whole, value)
+            value = whole
         prepared[key] = _prepare_value(hints[key], value, name, (*path, key))
     return prepared
 

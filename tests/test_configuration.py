@@ -253,3 +253,24 @@ def test_every_number_of_the_pipeline_has_a_unit_and_a_meaning() -> None:
         if "." in default:  # floats and lists of them
             assert unit in UNITS, key
             assert meaning, key
+
+
+class Inner(Section, frozen=True):
+    first: float = 1.0
+    second: float = 2.0
+
+
+class Middle(Section, frozen=True):
+    inner: Inner = Inner(second=4.0)
+    third: float = 3.0
+
+
+class Outer(Section, frozen=True):
+    middle: Middle = Middle(inner=Inner(first=5.0), third=6.0)
+
+
+def test_a_table_keeps_what_its_parent_gives_it() -> None:
+    """A pipeline's own defaults of a section outlive a key that is set in it."""
+    built = build(Outer, [{"middle": {"inner": {"second": 7.0}}}])
+    assert built == Outer(middle=Middle(inner=Inner(first=5.0, second=7.0), third=6.0))
+    assert build(Outer, [{}]) == Outer()

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from replay.importers.files import File
 from replay.importers.findings import Findings
-from replay.importers.frame_loops import (
+from replay.kernels.frame_loops import (
     CRC16,
     CRC24Q,
     CRC32,

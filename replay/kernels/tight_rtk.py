@@ -70,6 +70,7 @@ LEAD: Final = 3
 RTK_TIGHT_STATES: Final = MAX_STATES + ROOM - LEAD
 """Error states at most: those of the inertial system, and of the differences all but position."""
 _LEAST_DIFFERENCES: Final = 4
+_LOST: Final = 1
 _NAN = float("nan")
 
 
@@ -437,6 +438,18 @@ def show_fixed(
 
 
 @njit(cache=True)
+def _heed_late(rows: Array, q: Record) -> None:
+    """Remember breaks that the rover told in an epoch that comes after newer ones.
+
+    They are true of the phases since; its lock times and open half cycles are past.
+    """
+    for k in range(rows.shape[0]):
+        for slot in range(SLOTS):
+            if rows[k]["lock_lost"][slot] & _LOST:
+                q["slip"][rows[k]["satellite"], slot] = 1
+
+
+@njit(cache=True)
 def _take_epochs(
     s: Record, q: Record, cfg: Record, tcfg: Record, rcfg: Record, work: Record, solve: Record,
     epochs: Array, rows: Array, base_epochs: Array, base_rows: Array, partner: Array,
@@ -473,8 +486,7 @@ def _take_epochs(
             heed_breaks(part, 0, q)
             continue
         elif at < s["t"]:
-            # What it says of breaks is true of the phases after it all the same.
-            heed_breaks(part, 0, q)
+            _heed_late(part, q)
             late = (s["t"] - at) * 1e-9
             record_event(events, counts, epoch["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
             continue

@@ -57,6 +57,7 @@ class SppState:
     selection: Selection
     config: Array
     scratch: Array
+    placed: bool  # whether the log says where each epoch was, to some metres
 
 
 class SinglePoint:
@@ -69,7 +70,7 @@ class SinglePoint:
             Port(channels.GNSS_OBS),
             Port(channels.SATELLITES),
             Port(channels.CORRECTIONS),
-            Port(channels.COARSE),
+            Port(channels.COARSE, optional=True),
         ),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
@@ -89,6 +90,7 @@ class SinglePoint:
             selection=select_signals(config.gnss.signals, config.gnss.systems),
             config=single_config(config.gnss, config.spp),
             scratch=np.zeros(1, dtype=SOLVE_DTYPE),
+            placed=channels.COARSE.name in context.topics,
         )
 
     def step(self, state: SppState, block: Block) -> tuple[SppState, Outputs]:
@@ -103,6 +105,9 @@ class SinglePoint:
             block.get(channels.CORRECTIONS.name),
             block.get(channels.COARSE.name),
         )
+        if not state.placed:
+            # The iteration finds its way from the Earth's centre, too.
+            found.epochs["placed"] = 1
         solutions = np.zeros(len(found.epochs) + 1, dtype=single_point.SINGLE_ROW_DTYPE)
         residuals = np.zeros(len(found.rows), dtype=single_point.RESIDUAL_DTYPE)
         notes = np.zeros(len(found.rows) + 2 * len(found.epochs), dtype=NOTE_DTYPE)
