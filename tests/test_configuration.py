@@ -255,22 +255,22 @@ def test_every_number_of_the_pipeline_has_a_unit_and_a_meaning() -> None:
             assert meaning, key
 
 
-class Inner(Section, frozen=True):
+class Deepest(Section, frozen=True):
     first: float = 1.0
     second: float = 2.0
 
 
-class Middle(Section, frozen=True):
-    inner: Inner = Inner(second=4.0)
+class Between(Section, frozen=True):
+    inner: Deepest = Deepest(second=4.0)
     third: float = 3.0
 
 
-class Outer(Section, frozen=True):
-    middle: Middle = Middle(inner=Inner(first=5.0), third=6.0)
+class Topmost(Section, frozen=True):
+    middle: Between = Between(inner=Deepest(first=5.0), third=6.0)
 
 
 def test_a_table_keeps_what_its_parent_gives_it() -> None:
     """A pipeline's own defaults of a section outlive a key that is set in it."""
-    built = build(Outer, [{"middle": {"inner": {"second": 7.0}}}])
-    assert built == Outer(middle=Middle(inner=Inner(first=5.0, second=7.0), third=6.0))
-    assert build(Outer, [{}]) == Outer()
+    built = build(Topmost, [{"middle": {"inner": {"second": 7.0}}}])
+    assert built == Topmost(middle=Between(inner=Deepest(first=5.0, second=7.0), third=6.0))
+    assert build(Topmost, [{}]) == Topmost()
