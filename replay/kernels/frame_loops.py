@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-
 Bytes = npt.NDArray[np.uint8]
 Whole = int | np.int64
 
