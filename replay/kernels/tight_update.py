@@ -184,31 +184,34 @@ def meet_clocks(
 ) -> float:
     """Begin the clocks of systems that are new; by how much the receiver set its clock (m), or 0.
 
-    A clock has been set where the middle innovation is more than `jump` and three quarters
-    of the others are near it; reflected signals are late by different lengths.
+    A clock has been set where the middle innovation is more than `jump` and than four
+    deviations of the clock, and three quarters of the others are near it; reflected signals
+    are late by different lengths.
     """
-    aux = s["aux"]
-    shift = 0.0
-    for turn in range(2):
-        n = 0
-        for k in range(rows.shape[0]):
-            row = rows[k]
-            if usable(row, tcfg["single"]) and g["known"][row["system"]] == 1:
-                z = reduced_code(row, 0)
-                if z == z and turn == 0:
-                    scratch[n] = z - geometric_range(row, x, u) - aux[CLOCK + row["system"]]
-                    n += 1
-        if turn == 0 and n > 0:
-            middle = median(scratch, n)
-            near = 0
-            for k in range(n):
-                if abs(scratch[k] - middle) < 0.4 * abs(middle):
-                    near += 1
-            if abs(middle) > tcfg["jump"] and 4 * near >= 3 * n:
-                shift = middle
-                for system in range(SYSTEMS):
-                    aux[CLOCK + system] += middle
-                    widen(s, cfg, CLOCK + system, 1e6)
+    aux, P, first = s["aux"], s["P"], state_count(cfg) + CLOCK
+    shift, spread = 0.0, 0.0
+    n = 0
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        system = row["system"]
+        if usable(row, tcfg["single"]) and g["known"][system] == 1:
+            z = reduced_code(row, 0)
+            if z == z:
+                scratch[n] = z - geometric_range(row, x, u) - aux[CLOCK + system]
+                spread = max(spread, P[first + system, first + system])
+                n += 1
+    if n > 0:
+        middle = median(scratch, n)
+        near = 0
+        for k in range(n):
+            if abs(scratch[k] - middle) < 0.4 * abs(middle):
+                near += 1
+        surprising = abs(middle) > tcfg["jump"] and middle * middle > 16.0 * spread
+        if surprising and 4 * near >= 3 * n:
+            shift = middle
+            for system in range(SYSTEMS):
+                aux[CLOCK + system] += middle
+                widen(s, cfg, CLOCK + system, 1e6)
     for system in range(SYSTEMS):
         if g["known"][system] == 1:
             continue

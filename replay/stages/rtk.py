@@ -17,7 +17,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import Selection, gather_epochs, select_signals
-from replay.kernels import rtk, rtk_records, single_point, weighting
+from replay.kernels import rtk, rtk_records, single_point
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -49,18 +49,11 @@ from replay.stages.rtk_config import RtkConfig
 from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
+from replay.stages.spp_config import WEIGHTINGS
 
 Array = np.ndarray[Any, Any]
 
 _NS: Final = 1_000_000_000
-_WEIGHTINGS: Final = {
-    "equal": weighting.EQUAL,
-    "sine": weighting.SINE,
-    "threshold": weighting.THRESHOLD,
-    "double-angle": weighting.DOUBLE_ANGLE,
-    "strength": weighting.STRENGTH,
-    "sum": weighting.SUM,
-}
 _DYNAMICS: Final = ("static", "kinematic", "velocity", "acceleration")
 _MODES: Final = ("instantaneous", "continuous", "fix-and-hold", "float")
 _TESTS: Final = ("ratio", "w-ratio")
@@ -310,7 +303,7 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array) -> Array:
     record["cn0_mask"] = config.gnss.cn0_mask
     record["excluded"] = single["excluded"]
     record["slots"] = differences.frequencies
-    record["weighting"] = _WEIGHTINGS[differences.weighting]
+    record["weighting"] = WEIGHTINGS[differences.weighting]
     for name in ("clock_stability", "baseline_noise", "code_gate", "phase_gate"):
         record[name] = getattr(differences, name)
     for name in motion.__struct_fields__:

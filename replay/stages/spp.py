@@ -16,7 +16,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, gather_epochs, select_signals
-from replay.kernels import single_point, weighting
+from replay.kernels import single_point
 from replay.kernels.gnss_records import SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -31,18 +31,10 @@ from replay.stages.gnss_columns import (
     residual_columns,
 )
 from replay.stages.gnss_config import Gnss
-from replay.stages.spp_config import Spp, SppConfig
+from replay.stages.spp_config import WEIGHTINGS, Spp, SppConfig
 
 Array = np.ndarray[Any, Any]
 
-_WEIGHTINGS: Final = {
-    "equal": weighting.EQUAL,
-    "sine": weighting.SINE,
-    "threshold": weighting.THRESHOLD,
-    "double-angle": weighting.DOUBLE_ANGLE,
-    "strength": weighting.STRENGTH,
-    "sum": weighting.SUM,
-}
 _ROBUST: Final = {
     "none": single_point.ROBUST_NONE,
     "huber": single_point.ROBUST_HUBER,
@@ -163,7 +155,7 @@ def single_config(gnss: Gnss, spp: Spp) -> Array:
     record["code_sigma"] = spp.code_sigma
     record["system_scale"] = spp.system_scale
     record["doppler_sigma"] = spp.doppler_sigma
-    record["weight"]["model"] = _WEIGHTINGS[spp.weighting]
+    record["weight"]["model"] = WEIGHTINGS[spp.weighting]
     record["weight"]["range_scale"] = spp.range_std_scale
     record["weight"]["ionosphere"] = 0.0 if spp.ionosphere_free else spp.ionosphere_std
     record["weight"]["troposphere"] = spp.troposphere_std

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from replay.configuration import Section, quantity
+from replay.kernels import weighting
 from replay.stages.gnss_config import GnssConfig
 
 Weighting = Literal["equal", "sine", "threshold", "double-angle", "strength", "sum"]
+WEIGHTINGS: Final = {
+    "equal": weighting.EQUAL,
+    "sine": weighting.SINE,
+    "threshold": weighting.THRESHOLD,
+    "double-angle": weighting.DOUBLE_ANGLE,
+    "strength": weighting.STRENGTH,
+    "sum": weighting.SUM,
+}
+"""Numbers that the kernels have for :data:`Weighting`."""
 
 
 class Spp(Section, frozen=True):

@@ -23,7 +23,7 @@ from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, gather_epochs, select_signals
 from replay.kernels import tdcp as kernel
-from replay.kernels import tdcp_records, tdcp_solve, weighting
+from replay.kernels import tdcp_records, tdcp_solve
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -40,18 +40,11 @@ from replay.stages.gnss_columns import (
 )
 from replay.stages.gnss_config import Gnss
 from replay.stages.slip_columns import slip_columns, slip_config
+from replay.stages.spp_config import WEIGHTINGS
 from replay.stages.tdcp_config import Tdcp, TdcpConfig
 
 Array = np.ndarray[Any, Any]
 
-_WEIGHTINGS: Final = {
-    "equal": weighting.EQUAL,
-    "sine": weighting.SINE,
-    "threshold": weighting.THRESHOLD,
-    "double-angle": weighting.DOUBLE_ANGLE,
-    "strength": weighting.STRENGTH,
-    "sum": weighting.SUM,
-}
 _ROBUST: Final = {
     "none": tdcp_solve.ROBUST_NONE,
     "huber": tdcp_solve.ROBUST_HUBER,
@@ -176,7 +169,7 @@ def tdcp_config(gnss: Gnss, tdcp: Tdcp) -> Array:
         raise ConfigurationError("tdcp.initial_std has three numbers or one")
     record["mask"] = gnss.mask
     record["cn0_mask"] = gnss.cn0_mask
-    record["weight"]["model"] = _WEIGHTINGS[tdcp.weighting]
+    record["weight"]["model"] = WEIGHTINGS[tdcp.weighting]
     record["clocks"] = int(tdcp.clocks == "system")
     record["robust"] = _ROBUST[tdcp.robust]
     record["repair"] = int(tdcp.repair)

@@ -3,15 +3,18 @@
 Usage: python tools/bench/rinex.py [FILE]
 
 Without a file, one of RINEX 3.04 is generated: 1800 epochs, 30 satellites, 2
-signals. Both times are CPU seconds from the plain text to values in memory;
-RTKLIB's includes reading the file from the cache of the operating system.
+signals. All times are CPU seconds from the plain text to values in memory; that of
+RTKLIB and georinex includes reading the file from the cache of the operating system.
+georinex is timed, once, where it is installed.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,6 +59,17 @@ def generated() -> File:
     return File("generated", data, "", len(data))
 
 
+def _georinex(path: Path) -> float:
+    """CPU seconds of georinex, or 0 where it is not installed."""
+    if importlib.util.find_spec("georinex") is None:
+        return 0.0
+    import georinex  # type: ignore[import-not-found]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return fastest(lambda: georinex.load(path), rounds=1)
+
+
 def main() -> None:
     """Print megabytes per second."""
     if len(sys.argv) > 1:
@@ -76,9 +90,12 @@ def main() -> None:
             pyrtklib.freeobs(observations)
 
         theirs = fastest(peer)
+        slowest = _georinex(path)
     print(f"{file.name}: {size:.1f} MB, {rows} rows")
     print(f"read_rinex_obs  {size / ours:8.1f} MB/s")
     print(f"RTKLIB readrnx  {size / theirs:8.1f} MB/s, ratio {theirs / ours:.2f}")
+    if slowest > 0.0:
+        print(f"georinex.load   {size / slowest:8.2f} MB/s, ratio {slowest / ours:.0f}")
 
 
 if __name__ == "__main__":
