@@ -415,6 +415,27 @@ def _resolve(
 
 
 @njit(cache=True)
+def satellite_differences(measures: Array, total: int, pairs: Array) -> int:
+    """Satellites in use less the systems that they are of: what a position needs three of.
+
+    Frequencies do not count: they see the same direction.
+    """
+    seen = np.zeros(SATELLITES, dtype=np.int64)
+    systems = np.zeros(SYSTEMS, dtype=np.int64)
+    count = 0
+    for k in range(total):
+        m = measures[k]
+        if m["use"] == 1 and seen[m["satellite"]] == 0:
+            seen[m["satellite"]] = 1
+            count += 1
+            system = pairs[m["pair"]]["system"]
+            if systems[system] == 0:
+                systems[system] = 1
+                count -= 1
+    return count
+
+
+@njit(cache=True)
 def _count_satellites(
     part: Array, measures: Array, total: int, pairs: Array, status: int, weight: Array
 ) -> None:
@@ -521,7 +542,8 @@ def run_rtk(
                 for slot in range(SLOTS):
                     if broken[satellite, slot] == 1:
                         note(notes, counts, t, log_t, EVENT_SLIP, satellite, float(slot))
-            if total < _LEAST_DIFFERENCES:
+            few = cfg["dynamics"] == KINEMATIC and satellite_differences(measures, total, pairs) < 3
+            if total < _LEAST_DIFFERENCES or few:
                 note(notes, counts, t, log_t, EVENT_TOO_FEW, -1, float(total))
                 total = 0
         if total > 0:

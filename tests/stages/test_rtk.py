@@ -345,6 +345,22 @@ def test_without_the_base_there_is_a_single_position_and_an_event():
     np.testing.assert_allclose(age, [0, 0, 0, 0, 1, 2])
 
 
+def test_three_satellites_on_two_frequencies_are_no_position():
+    """Twelve measurements of three directions: nothing is claimed, neither fixed nor float."""
+    sky = make_sky(systems=("G",), count=8)
+    block, _ = pair(sky, still([300, -200, 20]))
+    start = int(block[channels.GNSS_OBS.name].valid_time_ns[0])
+    rows = block[channels.GNSS_OBS.name]
+    few = np.isin(rows["satellite"], sky.names[:3])
+    block[channels.GNSS_OBS.name] = rows.take(few | (rows.valid_time_ns < start + 6 * NS))
+    parts = run_stage(Rtk(), config(), [block])
+    solution = whole(parts, channels.SOLUTION)
+    assert (solution["status"][:6] >= FLOAT).all()
+    assert len(solution) == 6
+    kinds = whole(parts, channels.FILTER_EVENTS)["kind"]
+    assert (kinds == filter_pb2.EVENT_KIND_TOO_FEW_SATELLITES).sum() == 6
+
+
 def test_a_moving_base_gives_the_vector_between_the_receivers():
     sky = make_sky()
     base_path = drive([0, 0, 0], [12.0, 5.0, 0.2])
