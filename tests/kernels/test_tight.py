@@ -448,6 +448,7 @@ def test_clocks_are_carried_by_their_drift(dt):
 def test_a_clock_that_was_set_is_found(shift, late, told):
     """All ranges longer by as much, one of them late by 100 m besides."""
     s, g = filter_state()
+    know_clocks(s, 1.0)
     rows = satellites(s)
     rows["code"][:, 0] = ranges(s, rows) + corrections(rows) + shift
     rows["code"][:late, 0] += 100.0
@@ -460,6 +461,28 @@ def test_a_clock_that_was_set_is_found(shift, late, told):
     np.testing.assert_allclose(s["aux"][:SYSTEMS], aux[:SYSTEMS] + told, atol=1e-3)
     P = s["P"][INERTIAL : INERTIAL + SYSTEMS, :COUNT]
     assert np.array_equal(P[:, INERTIAL : INERTIAL + SYSTEMS], 1e6 * np.eye(SYSTEMS))
+
+
+def know_clocks(s, sigma):
+    """Clocks of a deviation (m) each, independent of all else."""
+    clocks = slice(INERTIAL, INERTIAL + SYSTEMS)
+    s["P"][clocks, :COUNT] = 0.0
+    s["P"][:COUNT, clocks] = 0.0
+    s["P"][clocks, clocks] = sigma * sigma * np.eye(SYSTEMS)
+
+
+@pytest.mark.parametrize(("sigma", "told"), [(2.4, 10.0), (2.6, 0.0)])
+def test_a_clock_that_drifted_is_no_set_clock(sigma, told):
+    """10 m are a jump for a clock known to four deviations less, and its own error for another."""
+    s, g = filter_state()
+    know_clocks(s, sigma)
+    rows = satellites(s)
+    rows["code"][:, 0] = ranges(s, rows) + corrections(rows) + 10.0
+    x = antenna_of(s)[0]
+    found = tight_update.meet_clocks(
+        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES)
+    )
+    assert found == pytest.approx(told, abs=1e-3)
 
 
 def test_late_ranges_are_no_set_clock():
