@@ -10,22 +10,9 @@ from typing import Any, Final
 from replay.configuration import Section
 from replay.errors import UsageError
 from replay.stages.base import Stage
-from replay.stages.gnss_ins_lc import GnssInsLoose
-from replay.stages.gnss_ins_tc import TightInertial
-from replay.stages.kfspp import FilteredSinglePoint
-from replay.stages.loose_config import LooseConfig
-from replay.stages.rtk import MovingBaseSatellites, Rtk
-from replay.stages.rtk_config import MovingBaseConfig, RtkConfig
-from replay.stages.rtk_ins_config import RtkInsConfig
-from replay.stages.rtk_ins_tc import RtkInertial
-from replay.stages.satellites import Satellites
-from replay.stages.spp import SinglePoint
-from replay.stages.spp_config import KfsppConfig, SppConfig
-from replay.stages.tdcp import TimeDifferencedPhase
-from replay.stages.tdcp_config import TdcpConfig
-from replay.stages.tdcp_ins import TdcpInertial
-from replay.stages.tdcp_ins_config import TdcpInsConfig
-from replay.stages.tight_config import TightConfig
+
+Parts = tuple[type[Section], tuple[Stage[Any], ...]]
+"""Settings that all stages are started with, and the stages, every input before its reader."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -37,72 +24,141 @@ class Pipeline:
     name : str
     about : str
         One line for a person.
-    config : type
-        Settings that all its stages are started with; their `name` names the run.
-    stages : callable
-        Makes the stages, in an order in which every input stands before its reader.
+    parts : callable
+        Settings and stages. It imports them, so that a run loads its own kernels alone.
     """
 
     name: str
     about: str
-    config: type[Section]
-    stages: Callable[[], tuple[Stage[Any], ...]]
+    parts: Callable[[], Parts]
+
+    @property
+    def config(self) -> type[Section]:
+        """Settings; their `name` names the run."""
+        return self.parts()[0]
+
+    def stages(self) -> tuple[Stage[Any], ...]:
+        """The stages, in an order in which every input stands before its reader."""
+        return self.parts()[1]
+
+
+def _gnss_ins_lc() -> Parts:
+    from replay.stages.gnss_ins_lc import GnssInsLoose
+    from replay.stages.loose_config import LooseConfig
+
+    return LooseConfig, (GnssInsLoose(),)
+
+
+def _gnss_ins_tc() -> Parts:
+    from replay.stages.gnss_ins_tc import TightInertial
+    from replay.stages.satellites import Satellites
+    from replay.stages.tight_config import TightConfig
+
+    return TightConfig, (Satellites(), TightInertial())
+
+
+def _spp() -> Parts:
+    from replay.stages.satellites import Satellites
+    from replay.stages.spp import SinglePoint
+    from replay.stages.spp_config import SppConfig
+
+    return SppConfig, (Satellites(), SinglePoint())
+
+
+def _kfspp() -> Parts:
+    from replay.stages.kfspp import FilteredSinglePoint
+    from replay.stages.satellites import Satellites
+    from replay.stages.spp_config import KfsppConfig
+
+    return KfsppConfig, (Satellites(), FilteredSinglePoint())
+
+
+def _tdcp() -> Parts:
+    from replay.stages.satellites import Satellites
+    from replay.stages.tdcp import TimeDifferencedPhase
+    from replay.stages.tdcp_config import TdcpConfig
+
+    return TdcpConfig, (Satellites(), TimeDifferencedPhase())
+
+
+def _tdcp_ins() -> Parts:
+    from replay.stages.satellites import Satellites
+    from replay.stages.tdcp import TimeDifferencedPhase
+    from replay.stages.tdcp_ins import TdcpInertial
+    from replay.stages.tdcp_ins_config import TdcpInsConfig
+
+    return TdcpInsConfig, (Satellites(), TimeDifferencedPhase(), TdcpInertial())
+
+
+def _rtk() -> Parts:
+    from replay.stages.rtk import Rtk
+    from replay.stages.rtk_config import RtkConfig
+    from replay.stages.satellites import Satellites
+
+    return RtkConfig, (Satellites(), Satellites("base"), Rtk())
+
+
+def _rtk_ins_tc() -> Parts:
+    from replay.stages.rtk_ins_config import RtkInsConfig
+    from replay.stages.rtk_ins_tc import RtkInertial
+    from replay.stages.satellites import Satellites
+
+    return RtkInsConfig, (Satellites(), Satellites("base"), RtkInertial())
+
+
+def _moving_base() -> Parts:
+    from replay.stages.rtk import MovingBaseSatellites, Rtk
+    from replay.stages.rtk_config import MovingBaseConfig
+    from replay.stages.satellites import Satellites
+
+    return MovingBaseConfig, (Satellites(), MovingBaseSatellites(), Rtk())
 
 
 _ALL: Final = (
     Pipeline(
         "gnss-ins-lc",
         "loosely coupled GNSS/INS: position and velocity fixes with inertial samples",
-        LooseConfig,
-        lambda: (GnssInsLoose(),),
+        _gnss_ins_lc,
     ),
     Pipeline(
         "gnss-ins-tc",
         "tightly coupled GNSS/INS without a base: ranges, Doppler, changes of carrier phase",
-        TightConfig,
-        lambda: (Satellites(), TightInertial()),
+        _gnss_ins_tc,
     ),
     Pipeline(
         "spp",
         "single-point positioning: pseudoranges to position, Doppler to velocity",
-        SppConfig,
-        lambda: (Satellites(), SinglePoint()),
+        _spp,
     ),
     Pipeline(
         "kfspp",
         "filtered single-point positioning: constant velocity over code and Doppler",
-        KfsppConfig,
-        lambda: (Satellites(), FilteredSinglePoint()),
+        _kfspp,
     ),
     Pipeline(
         "tdcp",
         "displacements from time-differenced carrier phases, chained to positions",
-        TdcpConfig,
-        lambda: (Satellites(), TimeDifferencedPhase()),
+        _tdcp,
     ),
     Pipeline(
         "tdcp-ins",
         "inertial samples held by displacements from time-differenced carrier phases",
-        TdcpInsConfig,
-        lambda: (Satellites(), TimeDifferencedPhase(), TdcpInertial()),
+        _tdcp_ins,
     ),
     Pipeline(
         "rtk",
         "relative positioning to a fixed base: codes and phases, integer ambiguities",
-        RtkConfig,
-        lambda: (Satellites(), Satellites("base"), Rtk()),
+        _rtk,
     ),
     Pipeline(
         "rtk-ins-tc",
         "tightly coupled RTK/INS: differences to a base, integers, inertial samples",
-        RtkInsConfig,
-        lambda: (Satellites(), Satellites("base"), RtkInertial()),
+        _rtk_ins_tc,
     ),
     Pipeline(
         "moving-base",
         "relative positioning of two receivers that both move: baseline, heading",
-        MovingBaseConfig,
-        lambda: (Satellites(), MovingBaseSatellites(), Rtk()),
+        _moving_base,
     ),
 )
 

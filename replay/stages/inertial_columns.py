@@ -6,8 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from replay.kernels import loose, records, tight
+from replay.kernels import loose, records
 from replay.log.columns import Columns, Ragged
+from replay.schemas import filter_pb2
 
 Array = np.ndarray[Any, Any]
 
@@ -25,7 +26,7 @@ _EVENT_TEXT: Final = {
     records.EVENT_TIME_BACKWARD: "{note} skipped: {value:.6f} s before the filter's time",
     records.EVENT_NOT_FINITE: "{note} skipped: not a finite number",
     records.EVENT_RESET: "position believed after {value:.0f} rejections in a row",
-    tight.EVENT_CLOCK_JUMP: "the receiver set its clock by {value:.3f} m",
+    int(filter_pb2.EVENT_KIND_CLOCK_JUMP): "the receiver set its clock by {value:.3f} m",
 }
 
 
