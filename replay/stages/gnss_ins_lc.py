@@ -14,8 +14,6 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.errors import DataError
-from replay.ins.states import state_names
 from replay.kernels import loose, records
 from replay.log.columns import Columns
 from replay.stages.base import Block, Context, Outputs, Port, StageSpec, dump_arrays, restore_arrays
@@ -26,8 +24,9 @@ from replay.stages.inertial_columns import (
     solution_columns,
     state_columns,
 )
-from replay.stages.inertial_settings import config_record
+from replay.stages.inertial_settings import config_record, names_of, require_room
 from replay.stages.loose_config import LooseConfig
+from replay.stages.waiting import SAMPLE_TYPES, HeldSamples
 
 Array = np.ndarray[Any, Any]
 
@@ -36,17 +35,13 @@ _EVENT_ROOM: Final = 4096
 
 
 @dataclasses.dataclass(slots=True)
-class LooseState:
+class LooseState(HeldSamples):
     """Everything that crosses from one block to the next."""
 
     settings: LooseConfig
     config: Array
     filter: Array
     pending: Array  # fixes that wait for a sample after them
-    held_t: Array  # inertial samples that wait for late fixes
-    held_log_t: Array
-    held_w: Array
-    held_f: Array
 
 
 class GnssInsLoose:
@@ -76,10 +71,6 @@ class GnssInsLoose:
             config=record,
             filter=records.new_state(),
             pending=np.zeros(0, dtype=records.FIX_DTYPE),
-            held_t=np.zeros(0, dtype=np.int64),
-            held_log_t=np.zeros(0, dtype=np.int64),
-            held_w=np.zeros((0, 3)),
-            held_f=np.zeros((0, 3)),
         )
 
     def step(self, state: LooseState, block: Block) -> tuple[LooseState, Outputs]:
@@ -93,17 +84,13 @@ class GnssInsLoose:
     def _take(self, state: LooseState, imu: Columns | None, fixes: Columns | None) -> Outputs:
         """Take inertial samples; `fixes` are pending already."""
         if imu is not None:
-            latency = round(state.settings.gnss.latency * _NS)
-            state.held_t = np.concatenate([state.held_t, imu.valid_time_ns])
-            state.held_log_t = np.concatenate([state.held_log_t, imu.log_time_ns + latency])
-            state.held_w = np.concatenate([state.held_w, imu["angular_rate_body_rad_s"]])
-            state.held_f = np.concatenate([state.held_f, imu["specific_force_body_m_s2"]])
+            state.hold(imu, state.settings.gnss.latency)
         ends = [
             int(rows.log_time_ns[-1]) for rows in (imu, fixes) if rows is not None and len(rows)
         ]
         if not ends:
             return {}
-        ready = int(np.searchsorted(state.held_log_t, max(ends), side="right"))
+        ready = state.ready(max(ends))
         return self._run(state, ready)
 
     def finish(self, state: LooseState) -> Outputs:
@@ -122,12 +109,7 @@ class GnssInsLoose:
 
     def _run(self, state: LooseState, ready: int) -> Outputs:
         samples, fixes = ready, len(state.pending)
-        names = state_names(
-            int(state.config["states"][0]),
-            mounting=bool(state.config["mounting"][0]),
-            lever=bool(state.config["lever"][0]),
-            squat=bool(state.config["squat"][0]),
-        )
+        names = names_of(state.config)
         states = len(names)
         # Rows that a block can give at most: predictions, one before and one at each fix.
         solutions = np.zeros(samples + 2 * fixes, dtype=records.SOLUTION_DTYPE)
@@ -152,14 +134,8 @@ class GnssInsLoose:
             events,
             counts,
         )
-        if counts[4]:
-            raise DataError(
-                f"{counts[4]} events of one block found no room",
-                where=self.spec.name,
-                mend="report this with the log: what happened would not be told",
-            )
-        state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
-        state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
+        require_room(int(counts[4]), self.spec.name)
+        state.release(ready)
         state.pending = state.pending[taken:]
         epochs = epochs[: counts[1]]
         outputs = {
@@ -178,10 +154,7 @@ def _dump_types() -> dict[str, np.dtype[Any]]:
     return {
         "filter": records.STATE_DTYPE,
         "pending": records.FIX_DTYPE,
-        "held_t": np.dtype(np.int64),
-        "held_log_t": np.dtype(np.int64),
-        "held_w": np.dtype(np.float64),
-        "held_f": np.dtype(np.float64),
+        **SAMPLE_TYPES,
     }
 
 

@@ -15,9 +15,8 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.errors import ConfigurationError, DataError
-from replay.gnss.measurements import Selection, gather_epochs, select_signals
-from replay.ins.states import state_names
+from replay.errors import ConfigurationError
+from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import records, tight, tight_records
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE
 from replay.kernels.least_squares import SOLVE_DTYPE
@@ -40,10 +39,11 @@ from replay.stages.inertial_columns import (
     solution_columns,
     state_columns,
 )
-from replay.stages.inertial_settings import config_record
+from replay.stages.inertial_settings import config_record, names_of, require_room
 from replay.stages.loose_config import Gnss, LooseConfig
 from replay.stages.spp import single_config
 from replay.stages.tight_config import TightConfig
+from replay.stages.waiting import SAMPLE_TYPES, HeldSamples, forget_epochs, join_epochs, read_epochs
 
 Array = np.ndarray[Any, Any]
 
@@ -53,7 +53,7 @@ _STATES: Final = tight_records.TIGHT_STATES
 
 
 @dataclasses.dataclass(slots=True)
-class TightState:
+class TightState(HeldSamples):
     """Everything that crosses from one block to the next."""
 
     settings: TightConfig
@@ -64,10 +64,6 @@ class TightState:
     tight: Array
     epochs: Array  # that wait for a sample after them
     rows: Array
-    held_t: Array  # inertial samples that wait for late epochs
-    held_log_t: Array
-    held_w: Array
-    held_f: Array
 
 
 class TightInertial:
@@ -108,37 +104,21 @@ class TightInertial:
             tight=tight_records.new_tight_state(),
             epochs=np.zeros(0, dtype=EPOCH_DTYPE),
             rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            held_t=np.zeros(0, dtype=np.int64),
-            held_log_t=np.zeros(0, dtype=np.int64),
-            held_w=np.zeros((0, 3)),
-            held_f=np.zeros((0, 3)),
         )
 
     def step(self, state: TightState, block: Block) -> tuple[TightState, Outputs]:
         """Take a block of inertial samples and epochs."""
         imu = block.get(channels.IMU.name)
         observations = block.get(channels.GNSS_OBS.name)
-        if observations is not None:
-            found = gather_epochs(
-                observations,
-                state.selection,
-                block.get(channels.SATELLITES.name),
-                block.get(channels.CORRECTIONS.name),
-                block.get(channels.COARSE.name),
-            )
-            found.epochs["first"] += len(state.rows)
-            state.epochs = np.concatenate([state.epochs, found.epochs])
-            state.rows = np.concatenate([state.rows, found.rows])
+        found = read_epochs(block, state.selection)
+        if found is not None:
+            state.epochs, state.rows = join_epochs(state.epochs, state.rows, found)
         if imu is not None:
-            latency = round(state.settings.tight.latency * _NS)
-            state.held_t = np.concatenate([state.held_t, imu.valid_time_ns])
-            state.held_log_t = np.concatenate([state.held_log_t, imu.log_time_ns + latency])
-            state.held_w = np.concatenate([state.held_w, imu["angular_rate_body_rad_s"]])
-            state.held_f = np.concatenate([state.held_f, imu["specific_force_body_m_s2"]])
+            state.hold(imu, state.settings.tight.latency)
         ends = [int(rows.log_time_ns[-1]) for rows in (imu, observations) if rows is not None]
         if not ends:
             return state, {}
-        ready = int(np.searchsorted(state.held_log_t, max(ends), side="right"))
+        ready = state.ready(max(ends))
         return state, self._run(state, ready)
 
     def finish(self, state: TightState) -> Outputs:
@@ -156,12 +136,7 @@ class TightInertial:
 
     def _run(self, state: TightState, ready: int) -> Outputs:
         count = len(state.epochs)
-        names = state_names(
-            int(state.config["states"][0]),
-            mounting=bool(state.config["mounting"][0]),
-            lever=bool(state.config["lever"][0]),
-            squat=bool(state.config["squat"][0]),
-        )
+        names = names_of(state.config)
         states = len(names)
         # Rows that a block can give at most: predictions, one before and one at each epoch.
         solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
@@ -191,17 +166,9 @@ class TightInertial:
                 satellites, residuals, tally,
             ),
         )  # fmt: skip
-        if counts[4]:
-            raise DataError(
-                f"{counts[4]} events of one block found no room",
-                where=self.spec.name,
-                mend="report this with the log: what happened would not be told",
-            )
-        state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
-        state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
-        used = int(state.epochs["first"][taken]) if taken < count else len(state.rows)
-        state.epochs, state.rows = state.epochs[taken:].copy(), state.rows[used:]
-        state.epochs["first"] -= used
+        require_room(int(counts[4]), self.spec.name)
+        state.release(ready)
+        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
         epochs, satellites = epochs[: counts[1]], satellites[: tally[1]]
         outputs = {
             channels.FILTER_INNOVATIONS: by_time(
@@ -218,9 +185,9 @@ class TightInertial:
         return {channel.name: rows for channel, rows in outputs.items() if len(rows)}
 
 
-def by_time(satellites: Columns, constraints: Columns) -> Columns:
-    """Innovations of satellites and of constraints in the order of their log times."""
-    joined = concatenate([satellites, constraints])
+def by_time(first: Columns, second: Columns) -> Columns:
+    """Rows of satellites and of the inertial system in the order of their log times."""
+    joined = concatenate([first, second])
     return joined.take(np.argsort(joined.log_time_ns, kind="stable").astype(np.int64))
 
 
@@ -230,10 +197,7 @@ def _dump_types() -> dict[str, np.dtype[Any]]:
         "tight": tight_records.TIGHT_STATE_DTYPE,
         "epochs": EPOCH_DTYPE,
         "rows": MEASURED_DTYPE,
-        "held_t": np.dtype(np.int64),
-        "held_log_t": np.dtype(np.int64),
-        "held_w": np.dtype(np.float64),
-        "held_f": np.dtype(np.float64),
+        **SAMPLE_TYPES,
     }
 
 

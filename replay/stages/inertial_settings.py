@@ -7,7 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from replay import channels
-from replay.errors import ConfigurationError
+from replay.errors import ConfigurationError, DataError
+from replay.ins.states import state_names
 from replay.kernels import records
 from replay.stages.base import Context
 from replay.stages.loose_config import LooseConfig
@@ -104,3 +105,29 @@ def config_record(config: LooseConfig, context: Context) -> Array:
                 mend="give one number for all, or one for each",
             ) from error
     return record
+
+
+def names_of(record: Array) -> tuple[str, ...]:
+    """Names of the error states of a record of CONFIG_DTYPE."""
+    return state_names(
+        int(record["states"][0]),
+        mounting=bool(record["mounting"][0]),
+        lever=bool(record["lever"][0]),
+        squat=bool(record["squat"][0]),
+    )
+
+
+def require_room(lost: int, stage: str) -> None:
+    """Refuse to go on where events of a block found no room.
+
+    Raises
+    ------
+    DataError
+        Where `lost` is not nought.
+    """
+    if lost:
+        raise DataError(
+            f"{lost} events of one block found no room",
+            where=stage,
+            mend="report this with the log: what happened would not be told",
+        )

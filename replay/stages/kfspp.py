@@ -14,7 +14,7 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.gnss.measurements import Selection, gather_epochs, select_signals
+from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import kinematic
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -39,6 +39,7 @@ from replay.stages.gnss_columns import (
 )
 from replay.stages.spp import single_config
 from replay.stages.spp_config import KfsppConfig
+from replay.stages.waiting import read_epochs
 
 Array = np.ndarray[Any, Any]
 
@@ -105,16 +106,9 @@ class FilteredSinglePoint:
 
     def step(self, state: KfsppState, block: Block) -> tuple[KfsppState, Outputs]:
         """Take a block of epochs."""
-        observations = block.get(channels.GNSS_OBS.name)
-        if observations is None:
+        found = read_epochs(block, state.selection)
+        if found is None:
             return state, {}
-        found = gather_epochs(
-            observations,
-            state.selection,
-            block.get(channels.SATELLITES.name),
-            block.get(channels.CORRECTIONS.name),
-            block.get(channels.COARSE.name),
-        )
         solutions = np.zeros(len(found.epochs), dtype=SINGLE_ROW_DTYPE)
         innovations = np.zeros(2 * len(found.rows), dtype=RESIDUAL_DTYPE)
         notes = np.zeros(2 * len(found.epochs), dtype=NOTE_DTYPE)

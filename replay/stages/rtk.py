@@ -16,9 +16,9 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
-from replay.gnss.measurements import Selection, gather_epochs, select_signals
+from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import rtk, rtk_records, single_point
-from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SLOTS, SYSTEMS
+from replay.kernels.gnss_records import SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
 from replay.log.columns import Columns
@@ -50,6 +50,7 @@ from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
 from replay.stages.spp_config import WEIGHTINGS
+from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, HeldEpochs
 
 Array = np.ndarray[Any, Any]
 
@@ -58,11 +59,10 @@ _DYNAMICS: Final = ("static", "kinematic", "velocity", "acceleration")
 _MODES: Final = ("instantaneous", "continuous", "fix-and-hold", "float")
 _TESTS: Final = ("ratio", "w-ratio")
 _PARTIALS: Final = ("none", "elevation", "success")
-_READ: Final = (channels.GNSS_OBS, channels.SATELLITES, channels.CORRECTIONS, channels.COARSE)
 
 
 @dataclasses.dataclass(slots=True)
-class RtkState:
+class RtkState(HeldEpochs):
     """Everything that crosses from one block to the next."""
 
     selection: Selection
@@ -72,12 +72,6 @@ class RtkState:
     kernel: Array
     x: Array
     P: Array
-    epochs: Array  # of the rover, that wait
-    rows: Array
-    base_epochs: Array  # the last one used, and later ones
-    base_rows: Array
-    now: Array  # ns, one element: log time of the last row
-    released: Array  # ns, one element: log time of the last epoch's outputs
 
 
 class Rtk:
@@ -86,7 +80,7 @@ class Rtk:
     spec = StageSpec(
         name="rtk",
         version=1,
-        inputs=tuple(Port(channel, role) for role in (RECEIVER, BASE) for channel in _READ),
+        inputs=tuple(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
             Port(channels.FILTER_GEOMETRY),
@@ -114,31 +108,11 @@ class Rtk:
             kernel=rtk_records.new_rtk_state(),
             x=np.zeros(rtk_records.ROOM),
             P=np.zeros((rtk_records.ROOM, rtk_records.ROOM)),
-            epochs=np.zeros(0, dtype=EPOCH_DTYPE),
-            rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            base_epochs=np.zeros(0, dtype=EPOCH_DTYPE),
-            base_rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            now=np.zeros(1, dtype=np.int64),
-            released=np.zeros(1, dtype=np.int64),
         )
 
     def step(self, state: RtkState, block: Block) -> tuple[RtkState, Outputs]:
         """Take a block of epochs of both receivers."""
-        for role in (RECEIVER, BASE):
-            columns = [block.get(Port(channel, role).name) for channel in _READ]
-            observations = columns[0]
-            if observations is None:
-                continue
-            found = gather_epochs(observations, state.selection, *columns[1:])
-            state.now[0] = max(int(state.now[0]), int(observations.log_time_ns[-1]))
-            if role == RECEIVER:
-                state.epochs, state.rows = join_epochs(
-                    state.epochs, state.rows, found.epochs, found.rows
-                )
-            else:
-                state.base_epochs, state.base_rows = join_epochs(
-                    state.base_epochs, state.base_rows, found.epochs, found.rows
-                )
+        state.take(block, state.selection)
         return state, self._run(state, int(state.now[0]))
 
     def finish(self, state: RtkState) -> Outputs:
@@ -208,7 +182,7 @@ class Rtk:
             resolutions, notes, counts,
         )  # fmt: skip
         state.released[0] = release[ready - 1]
-        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, ready)
+        state.forget(ready)
         self._forget(state)
         columns: dict[channels.ChannelSpec, Columns] = {
             channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[2]]),
@@ -224,12 +198,9 @@ class Rtk:
     @staticmethod
     def _forget(state: RtkState) -> None:
         """Drop base epochs that no rover epoch can ask for any more."""
-        times = state.base_epochs["t"]
-        if len(times):
-            keep = times >= int(times.max()) - rtk.LATE_NS - state.times[2]
-            state.base_epochs, state.base_rows = forget_epochs(
-                state.base_epochs, state.base_rows, int(np.argmax(keep))
-            )
+        if len(state.base_epochs):
+            newest = int(state.base_epochs["t"].max())
+            state.forget_base(newest - rtk.LATE_NS - state.times[2])
 
 
 class MovingBaseSatellites(Satellites):
@@ -246,34 +217,10 @@ class MovingBaseSatellites(Satellites):
 def _dump_types() -> dict[str, np.dtype[Any]]:
     return {
         "kernel": rtk_records.RTK_STATE_DTYPE,
-        "epochs": EPOCH_DTYPE,
-        "rows": MEASURED_DTYPE,
-        "base_epochs": EPOCH_DTYPE,
-        "base_rows": MEASURED_DTYPE,
-        "now": np.dtype(np.int64),
-        "released": np.dtype(np.int64),
+        **EPOCH_TYPES,
         "x": np.dtype(np.float64),
         "P": np.dtype(np.float64),
     }
-
-
-def join_epochs(epochs: Array, rows: Array, more: Array, more_rows: Array) -> tuple[Array, Array]:
-    """Epochs with their rows, the first numbers of rows set right."""
-    if len(epochs) == 0:
-        return more, more_rows
-    more = more.copy()
-    more["first"] += len(rows)
-    return np.concatenate([epochs, more]), np.concatenate([rows, more_rows])
-
-
-def forget_epochs(epochs: Array, rows: Array, count: int) -> tuple[Array, Array]:
-    """Epochs from `count` on with their rows."""
-    if count == len(epochs):
-        return epochs[:0].copy(), rows[:0].copy()
-    start = int(epochs["first"][count])
-    epochs = epochs[count:].copy()
-    epochs["first"] -= start
-    return epochs, rows[start:].copy()
 
 
 def rtk_config(config: RtkConfig | RtkInsConfig, single: Array) -> Array:

@@ -14,15 +14,14 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.errors import ConfigurationError, DataError
-from replay.gnss.measurements import Selection, gather_epochs, select_signals
-from replay.ins.states import state_names
+from replay.errors import ConfigurationError
+from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import records, rtk, rtk_records, tight_rtk
-from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SLOTS
+from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
 from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
-from replay.log.columns import Columns, concatenate
+from replay.log.columns import Columns
 from replay.stages.base import (
     BASE,
     RECEIVER,
@@ -44,10 +43,12 @@ from replay.stages.inertial_columns import (
     solution_columns,
     state_columns,
 )
-from replay.stages.rtk import forget_epochs, join_epochs, rtk_config
+from replay.stages.inertial_settings import names_of, require_room
+from replay.stages.rtk import rtk_config
 from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns, resolution_columns
 from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.spp import single_config
+from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, SAMPLE_TYPES, HeldEpochs, HeldSamples
 
 Array = np.ndarray[Any, Any]
 
@@ -55,11 +56,10 @@ _NS: Final = 1_000_000_000
 _EVENT_ROOM: Final = 4096
 _NEVER: Final = -(2**62)
 _STATES: Final = tight_rtk.RTK_TIGHT_STATES
-_READ: Final = (channels.GNSS_OBS, channels.SATELLITES, channels.CORRECTIONS, channels.COARSE)
 
 
 @dataclasses.dataclass(slots=True)
-class RtkInsState:
+class RtkInsState(HeldSamples, HeldEpochs):
     """Everything that crosses from one block to the next."""
 
     settings: RtkInsConfig
@@ -69,16 +69,6 @@ class RtkInsState:
     rtk_config: Array
     filter: Array
     kernel: Array
-    epochs: Array  # of the rover, that wait
-    rows: Array
-    base_epochs: Array
-    base_rows: Array
-    held_t: Array  # inertial samples that wait for epochs
-    held_log_t: Array
-    held_w: Array
-    held_f: Array
-    now: Array  # ns, one element: log time of the last row
-    released: Array  # ns, one element: log time of the last epoch's release
 
 
 class RtkInertial:
@@ -89,7 +79,7 @@ class RtkInertial:
         version=1,
         inputs=(
             Port(channels.IMU),
-            *(Port(channel, role) for role in (RECEIVER, BASE) for channel in _READ),
+            *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
         ),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
@@ -121,43 +111,15 @@ class RtkInertial:
             rtk_config=rtk_config(config, single_config(config.gnss, config.spp)),
             filter=records.new_state(_STATES),
             kernel=rtk_records.new_rtk_state(),
-            epochs=np.zeros(0, dtype=EPOCH_DTYPE),
-            rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            base_epochs=np.zeros(0, dtype=EPOCH_DTYPE),
-            base_rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            held_t=np.zeros(0, dtype=np.int64),
-            held_log_t=np.zeros(0, dtype=np.int64),
-            held_w=np.zeros((0, 3)),
-            held_f=np.zeros((0, 3)),
-            now=np.zeros(1, dtype=np.int64),
-            released=np.zeros(1, dtype=np.int64),
         )
 
     def step(self, state: RtkInsState, block: Block) -> tuple[RtkInsState, Outputs]:
         """Take a block of inertial samples and of epochs of both receivers."""
-        for role in (RECEIVER, BASE):
-            columns = [block.get(Port(channel, role).name) for channel in _READ]
-            observations = columns[0]
-            if observations is None:
-                continue
-            found = gather_epochs(observations, state.selection, *columns[1:])
-            state.now[0] = max(int(state.now[0]), int(observations.log_time_ns[-1]))
-            if role == RECEIVER:
-                state.epochs, state.rows = join_epochs(
-                    state.epochs, state.rows, found.epochs, found.rows
-                )
-            else:
-                state.base_epochs, state.base_rows = join_epochs(
-                    state.base_epochs, state.base_rows, found.epochs, found.rows
-                )
+        state.take(block, state.selection)
         imu = block.get(channels.IMU.name)
         if imu is not None:
-            latency = round(state.settings.tight.latency * _NS)
             state.now[0] = max(int(state.now[0]), int(imu.log_time_ns[-1]))
-            state.held_t = np.concatenate([state.held_t, imu.valid_time_ns])
-            state.held_log_t = np.concatenate([state.held_log_t, imu.log_time_ns + latency])
-            state.held_w = np.concatenate([state.held_w, imu["angular_rate_body_rad_s"]])
-            state.held_f = np.concatenate([state.held_f, imu["specific_force_body_m_s2"]])
+            state.hold(imu, state.settings.tight.latency)
         return state, self._run(state)
 
     def finish(self, state: RtkInsState) -> Outputs:
@@ -203,15 +165,10 @@ class RtkInertial:
 
     def _run(self, state: RtkInsState) -> Outputs:
         epochs, partner = self._release(state)
-        ready = int(np.searchsorted(state.held_log_t, int(state.now[0]), side="right"))
+        ready = state.ready(int(state.now[0]))
         count = len(epochs)
         end = int(epochs["first"][-1] + epochs["count"][-1]) if count else 0
-        names = state_names(
-            int(state.config["states"][0]),
-            mounting=bool(state.config["mounting"][0]),
-            lever=bool(state.config["lever"][0]),
-            squat=bool(state.config["squat"][0]),
-        )
+        names = names_of(state.config)
         states = len(names)
         solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
         rows = np.zeros(count, dtype=records.EPOCH_DTYPE)
@@ -235,25 +192,17 @@ class RtkInertial:
                 geometry, residuals, ambiguities, resolutions, notes, tally,
             ),
         )  # fmt: skip
-        if counts[4]:
-            raise DataError(
-                f"{counts[4]} events of one block found no room",
-                where=self.spec.name,
-                mend="report this with the log: what happened would not be told",
-            )
+        require_room(int(counts[4]), self.spec.name)
         if taken:
             state.released[0] = epochs["log_t"][taken - 1]
-        state.held_t, state.held_log_t = state.held_t[ready:], state.held_log_t[ready:]
-        state.held_w, state.held_f = state.held_w[ready:], state.held_f[ready:]
-        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
+        state.release(ready)
+        state.forget(taken)
         times = state.base_epochs["t"]
         if len(times):
             # Epochs that wait for inertial samples ask for old ones of the base.
             oldest = min(int(times.max()), int(state.epochs["t"].min(initial=times.max())))
             oldest -= rtk.LATE_NS + round(state.settings.base.max_age * _NS)
-            state.base_epochs, state.base_rows = forget_epochs(
-                state.base_epochs, state.base_rows, int(np.argmax(times >= oldest))
-            )
+            state.forget_base(oldest)
         rows, geometry = rows[: counts[1]], geometry[: tally[0]]
         columns: dict[channels.ChannelSpec, Columns] = {
             channels.FILTER_INNOVATIONS: by_time(
@@ -265,7 +214,7 @@ class RtkInertial:
             channels.FILTER_RESOLUTION: resolution_columns(resolutions[: tally[4]]),
             channels.FILTER_STATE: state_columns(rows),
             channels.FILTER_COVARIANCE: covariance_columns(rows, covariances[: counts[1]], names),
-            channels.FILTER_EVENTS: _events(
+            channels.FILTER_EVENTS: by_time(
                 event_columns(events[: counts[3]]),
                 gnss_event_columns(notes[: tally[5]], RTK_EVENT_TEXT),
             ),
@@ -274,24 +223,10 @@ class RtkInertial:
         return {channel.name: found for channel, found in columns.items() if len(found)}
 
 
-def _events(inertial: Columns, satellites: Columns) -> Columns:
-    """Events of both kinds in the order of their log times."""
-    joined = concatenate([inertial, satellites])
-    return joined.take(np.argsort(joined.log_time_ns, kind="stable").astype(np.int64))
-
-
 def _dump_types() -> dict[str, np.dtype[Any]]:
     return {
         "filter": records.state_dtype(_STATES),
         "kernel": rtk_records.RTK_STATE_DTYPE,
-        "epochs": EPOCH_DTYPE,
-        "rows": MEASURED_DTYPE,
-        "base_epochs": EPOCH_DTYPE,
-        "base_rows": MEASURED_DTYPE,
-        "held_t": np.dtype(np.int64),
-        "held_log_t": np.dtype(np.int64),
-        "held_w": np.dtype(np.float64),
-        "held_f": np.dtype(np.float64),
-        "now": np.dtype(np.int64),
-        "released": np.dtype(np.int64),
+        **EPOCH_TYPES,
+        **SAMPLE_TYPES,
     }

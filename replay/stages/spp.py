@@ -15,7 +15,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
-from replay.gnss.measurements import SATELLITE_NAMES, Selection, gather_epochs, select_signals
+from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals
 from replay.kernels import single_point
 from replay.kernels.gnss_records import SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
@@ -32,6 +32,7 @@ from replay.stages.gnss_columns import (
 )
 from replay.stages.gnss_config import Gnss
 from replay.stages.spp_config import WEIGHTINGS, Spp, SppConfig
+from replay.stages.waiting import read_epochs
 
 Array = np.ndarray[Any, Any]
 
@@ -87,16 +88,9 @@ class SinglePoint:
 
     def step(self, state: SppState, block: Block) -> tuple[SppState, Outputs]:
         """Take a block of epochs."""
-        observations = block.get(channels.GNSS_OBS.name)
-        if observations is None:
+        found = read_epochs(block, state.selection)
+        if found is None:
             return state, {}
-        found = gather_epochs(
-            observations,
-            state.selection,
-            block.get(channels.SATELLITES.name),
-            block.get(channels.CORRECTIONS.name),
-            block.get(channels.COARSE.name),
-        )
         if not state.placed:
             # The iteration finds its way from the Earth's centre, too.
             found.epochs["placed"] = 1

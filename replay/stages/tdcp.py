@@ -21,7 +21,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
-from replay.gnss.measurements import SATELLITE_NAMES, Selection, gather_epochs, select_signals
+from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals
 from replay.kernels import tdcp as kernel
 from replay.kernels import tdcp_records, tdcp_solve
 from replay.kernels.gnss_records import SLOTS
@@ -42,6 +42,7 @@ from replay.stages.gnss_config import Gnss
 from replay.stages.slip_columns import slip_columns, slip_config
 from replay.stages.spp_config import WEIGHTINGS
 from replay.stages.tdcp_config import Tdcp, TdcpConfig
+from replay.stages.waiting import read_epochs
 
 Array = np.ndarray[Any, Any]
 
@@ -100,16 +101,9 @@ class TimeDifferencedPhase:
 
     def step(self, state: TdcpState, block: Block) -> tuple[TdcpState, Outputs]:
         """Take a block of epochs."""
-        observations = block.get(channels.GNSS_OBS.name)
-        if observations is None:
+        found = read_epochs(block, state.selection)
+        if found is None:
             return state, {}
-        found = gather_epochs(
-            observations,
-            state.selection,
-            block.get(channels.SATELLITES.name),
-            block.get(channels.CORRECTIONS.name),
-            block.get(channels.COARSE.name),
-        )
         epochs, phases = len(found.epochs), SLOTS * len(found.rows)
         solutions = np.zeros(epochs + 1, dtype=SINGLE_ROW_DTYPE)
         displacements = np.zeros(epochs + 1, dtype=tdcp_records.DISPLACEMENT_DTYPE)

@@ -1,0 +1,139 @@
+"""Rows that wait from block to block: inertial samples for epochs, epochs for a base.
+
+States of stages that hold such rows build on these.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.gnss.measurements import Epochs, Selection, gather_epochs
+from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE
+from replay.log.columns import Columns
+from replay.stages.base import BASE, RECEIVER, Block, Port
+
+Array = np.ndarray[Any, Any]
+
+SAMPLE_TYPES: Final[dict[str, np.dtype[Any]]] = {
+    "held_t": np.dtype(np.int64),
+    "held_log_t": np.dtype(np.int64),
+    "held_w": np.dtype(np.float64),
+    "held_f": np.dtype(np.float64),
+}
+"""Of the fields of :class:`HeldSamples`, for dumps."""
+
+EPOCH_READS: Final = (
+    channels.GNSS_OBS,
+    channels.SATELLITES,
+    channels.CORRECTIONS,
+    channels.COARSE,
+)
+"""What makes whole epochs of a receiver."""
+
+_NS: Final = 1_000_000_000
+
+
+@dataclasses.dataclass(kw_only=True)
+class HeldSamples:
+    """Inertial samples that wait for what may come late."""
+
+    held_t: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    held_log_t: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    held_w: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+    held_f: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+    def hold(self, imu: Columns, latency_s: float) -> None:
+        """Keep samples until `latency_s` after their log times."""
+        latency = round(latency_s * _NS)
+        self.held_t = np.concatenate([self.held_t, imu.valid_time_ns])
+        self.held_log_t = np.concatenate([self.held_log_t, imu.log_time_ns + latency])
+        self.held_w = np.concatenate([self.held_w, imu["angular_rate_body_rad_s"]])
+        self.held_f = np.concatenate([self.held_f, imu["specific_force_body_m_s2"]])
+
+    def ready(self, now_ns: int) -> int:
+        """How many have waited long enough at a log time."""
+        return int(np.searchsorted(self.held_log_t, now_ns, side="right"))
+
+    def release(self, count: int) -> None:
+        """Let the first ones go."""
+        self.held_t, self.held_log_t = self.held_t[count:], self.held_log_t[count:]
+        self.held_w, self.held_f = self.held_w[count:], self.held_f[count:]
+
+
+@dataclasses.dataclass(kw_only=True)
+class HeldEpochs:
+    """Epochs of a rover that wait for a base's, and epochs of the base."""
+
+    epochs: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=EPOCH_DTYPE))
+    rows: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=MEASURED_DTYPE))
+    base_epochs: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=EPOCH_DTYPE))
+    base_rows: Array = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=MEASURED_DTYPE))
+    # ns, one element each: log time of the last row, and of the last epoch's release.
+    now: Array = dataclasses.field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    released: Array = dataclasses.field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+
+    def take(self, block: Block, selection: Selection) -> None:
+        """Take the epochs of both receivers in a block."""
+        for role in (RECEIVER, BASE):
+            found = read_epochs(block, selection, role)
+            if found is None:
+                continue
+            log_times = block[Port(channels.GNSS_OBS, role).name].log_time_ns
+            self.now[0] = max(int(self.now[0]), int(log_times[-1]))
+            if role == RECEIVER:
+                self.epochs, self.rows = join_epochs(self.epochs, self.rows, found)
+            else:
+                self.base_epochs, self.base_rows = join_epochs(
+                    self.base_epochs, self.base_rows, found
+                )
+
+    def forget(self, count: int) -> None:
+        """Drop the rover's first epochs."""
+        self.epochs, self.rows = forget_epochs(self.epochs, self.rows, count)
+
+    def forget_base(self, oldest_ns: int) -> None:
+        """Drop the base's epochs before the first one that is not older than a time."""
+        if len(self.base_epochs):
+            self.base_epochs, self.base_rows = forget_epochs(
+                self.base_epochs, self.base_rows, int(np.argmax(self.base_epochs["t"] >= oldest_ns))
+            )
+
+
+EPOCH_TYPES: Final[dict[str, np.dtype[Any]]] = {
+    "epochs": EPOCH_DTYPE,
+    "rows": MEASURED_DTYPE,
+    "base_epochs": EPOCH_DTYPE,
+    "base_rows": MEASURED_DTYPE,
+    "now": np.dtype(np.int64),
+    "released": np.dtype(np.int64),
+}
+"""Of the fields of :class:`HeldEpochs`, for dumps."""
+
+
+def read_epochs(block: Block, selection: Selection, role: str = RECEIVER) -> Epochs | None:
+    """Epochs of one receiver in a block with what is known of them; None without any."""
+    observations, *known = (block.get(Port(channel, role).name) for channel in EPOCH_READS)
+    return None if observations is None else gather_epochs(observations, selection, *known)
+
+
+def join_epochs(epochs: Array, rows: Array, more: Epochs) -> tuple[Array, Array]:
+    """Epochs with their rows, the first numbers of rows set right."""
+    if len(epochs) == 0:
+        return more.epochs, more.rows
+    later = more.epochs.copy()
+    later["first"] += len(rows)
+    return np.concatenate([epochs, later]), np.concatenate([rows, more.rows])
+
+
+def forget_epochs(epochs: Array, rows: Array, count: int) -> tuple[Array, Array]:
+    """Epochs from `count` on with their rows."""
+    if count == len(epochs):
+        return epochs[:0].copy(), rows[:0].copy()
+    start = int(epochs["first"][count])
+    epochs = epochs[count:].copy()
+    epochs["first"] -= start
+    return epochs, rows[start:].copy()
