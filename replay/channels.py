@@ -267,6 +267,103 @@ TRUTH: Final = ChannelSpec(
         "attitude_rad": _RAD,
     },
 )
+NETWORK_AMBIGUITIES: Final = ChannelSpec(
+    "NETWORK_AMBIGUITIES",
+    "/network/{baseline}/ambiguities",
+    "replay.DoubleDifferenceAmbiguity",
+    "ambiguities between two reference stations; the wide lane is the signal WL",
+    key=("satellite", "signal"),
+    tolerances={
+        "float_cycles": Tolerance(1e-4, "cycle"),
+        "float_std_cycles": Tolerance(1e-4, "cycle"),
+        "integer_cycles": Tolerance(1e-9, "cycle"),
+    },
+)
+NETWORK_RESOLUTION: Final = ChannelSpec(
+    "NETWORK_RESOLUTION",
+    "/network/{baseline}/resolution",
+    "replay.NetworkResolution",
+    "tests of the integers between two reference stations",
+    key=("signal",),
+    tolerances={
+        "ratio": Tolerance(1e-4, "1"),
+        "w_ratio": Tolerance(1e-4, "1"),
+        "threshold": Tolerance(1e-6, "1"),
+        "success_rate": Tolerance(1e-6, "1"),
+    },
+)
+NETWORK_RESIDUALS: Final = ChannelSpec(
+    "NETWORK_RESIDUALS",
+    "/network/{baseline}/residuals",
+    "replay.NetworkResidual",
+    "phases between two reference stations less everything that is known",
+    key=("satellite", "signal"),
+    tolerances={"residual_m": _M, "residual_std_m": _M},
+)
+NETWORK_ERRORS: Final = ChannelSpec(
+    "NETWORK_ERRORS",
+    "/network/{baseline}/errors",
+    "replay.BaselineError",
+    "filtered errors between two reference stations that grow with the distance",
+    key=("satellite", "signal"),
+    tolerances={
+        "error_m": _M,
+        "error_rate_m_s": Tolerance(1e-6, "m/s"),
+        "error_acceleration_m_s2": Tolerance(1e-8, "m/s^2"),
+        "multipath_m": _M,
+        "error_std_m": _M,
+        "error_rate_std_m_s": Tolerance(1e-6, "m/s"),
+        "error_acceleration_std_m_s2": Tolerance(1e-8, "m/s^2"),
+        "multipath_std_m": _M,
+        "innovation_m": _M,
+        "innovation_std_m": _M,
+    },
+)
+NETWORK_EVENTS: Final = ChannelSpec(
+    "NETWORK_EVENTS",
+    "/network/{baseline}/events",
+    "replay.FilterEvent",
+    "slips, repaired integers, stations lost, of a baseline between reference stations",
+    key=("kind", "detail"),
+    tolerances={"value": Tolerance(1e-6, "1")},
+)
+NETWORK_CORRECTIONS: Final = ChannelSpec(
+    "NETWORK_CORRECTIONS",
+    "/network/{rover}/corrections",
+    "replay.NetworkCorrection",
+    "errors of a rover's phases against the master station, from the network",
+    key=("satellite", "signal"),
+    tolerances={
+        "correction_m": _M,
+        "correction_std_m": _M,
+        "misfit_m": _M,
+        "age_s": Tolerance(1e-9, "s"),
+    },
+)
+SIGNAL_TRUTH: Final = ChannelSpec(
+    "SIGNAL_TRUTH",
+    "/truth/{receiver}/signals",
+    "replay.SignalTruth",
+    "what a simulator put into each signal",
+    key=("satellite", "signal"),
+    tolerances={
+        name: _M
+        for name in (
+            "range_m",
+            "satellite_clock_m",
+            "receiver_clock_m",
+            "ionosphere_m",
+            "troposphere_m",
+            "shapiro_m",
+            "orbit_error_m",
+            "code_delay_m",
+            "code_multipath_m",
+            "carrier_multipath_m",
+            "code_noise_m",
+            "carrier_noise_m",
+        )
+    },
+)
 FILTER_STATE: Final = ChannelSpec(
     "FILTER_STATE",
     "/filter/{run}/state",
@@ -424,12 +521,19 @@ CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     GNSS_OBS,
     GNSS_FIX,
     TRUTH,
+    SIGNAL_TRUTH,
     SATELLITES,
     CORRECTIONS,
     COARSE,
     GNSS_EVENTS,
     SLIPS,
     DISPLACEMENT,
+    NETWORK_AMBIGUITIES,
+    NETWORK_RESOLUTION,
+    NETWORK_RESIDUALS,
+    NETWORK_EVENTS,
+    NETWORK_ERRORS,
+    NETWORK_CORRECTIONS,
     FILTER_INNOVATIONS,
     FILTER_CLOCKS,
     FILTER_GEOMETRY,

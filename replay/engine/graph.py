@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from replay.errors import MissingChannelError, UsageError
-from replay.stages.base import Port, Stage
+from replay.stages.base import BASE, RECEIVER, Port, Stage
 
-_USUAL: Final = {"receiver": "rover", "base": "base"}
+_USUAL: Final = {RECEIVER: "rover", BASE: "base"}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def bind(
         inputs = {port.name: topic for port, topic in found if topic is not None}
         named = dict(chosen)
         for port, topic in found:
-            if topic is not None:
+            if topic is not None and port.role in _USUAL and "{receiver}" in port.channel.topic:
                 named.setdefault(port.role, port.channel.parts(topic).get("receiver", ""))
         if not last and _recorded_already(stage, stages[place + 1 :], own, recorded, named):
             continue
@@ -109,7 +109,13 @@ def bind(
 
 
 def _topic(port: Port, run: str, receivers: Mapping[str, str]) -> str:
-    return port.channel.at(run=run, receiver=receivers.get(port.role, ""))
+    named = port.role if port.role not in _USUAL else ""
+    return port.channel.at(
+        run=run,
+        receiver=receivers.get(port.role, named),
+        baseline=named,
+        rover=receivers.get(RECEIVER, ""),
+    )
 
 
 def _recorded_already(
@@ -142,7 +148,14 @@ def _find(
     fitting = [topic for topic in topics if spec.matches(topic)]
     if port.run:
         fitting = [topic for topic in fitting if spec.parts(topic).get("run") == port.run]
-    if "{receiver}" in spec.topic:
+    if "{baseline}" in spec.topic:
+        fitting = [topic for topic in fitting if spec.parts(topic)["baseline"] == port.role]
+    elif port.role not in _USUAL:
+        fitting = [topic for topic in fitting if spec.parts(topic)["receiver"] == port.role]
+    elif "{rover}" in spec.topic:
+        rover = receivers.get(RECEIVER)
+        fitting = [topic for topic in fitting if rover in ("", None, spec.parts(topic)["rover"])]
+    elif "{receiver}" in spec.topic:
         of = {spec.parts(topic)["receiver"]: topic for topic in fitting}
         name = receivers.get(port.role, "")
         if name:

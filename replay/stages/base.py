@@ -32,7 +32,8 @@ class Port:
     channel : ChannelSpec
     role : str
         What part the receiver in the topic plays: the configuration's `gnss` section
-        names the receiver of each role.
+        names the receivers of RECEIVER and BASE; any other role is the name itself, of a
+        receiver or of a baseline between two.
     run : str
         Of an input, the stage whose run the topic speaks of; empty for the run itself.
     optional : bool
