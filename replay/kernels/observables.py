@@ -1,6 +1,6 @@
 """What a simulated receiver could see of one satellite: the truth, without noise.
 
-The satellite is that of a broadcast record, at the moment when what arrives was sent;
+The satellite is that of its true orbit's records, at the moment when what arrives was sent;
 the range is the light-time solution with the Earth's rotation, and the rates are the
 exact derivatives of the same formulas. Rates of the atmosphere are central differences
 over a second. The atmosphere's delays are added to the range; that the signal left so
@@ -23,15 +23,26 @@ from replay.kernels.atmosphere import (
 )
 from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes, geodetic
 from replay.kernels.elementary import log, sqrt
-from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, satellite_state, state_at_reception
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, satellite_state
 from replay.kernels.rotation import rotate3
 from replay.kernels.sight import elevation_azimuth, line_of_sight
+from replay.kernels.sky_fields import (
+    WAVES,
+    gradient_delay,
+    vertical_ionosphere,
+    zenith_wet_field,
+)
+from replay.kernels.true_orbit import between_messages, true_state
 from replay.kernels.types import Array, Record
 
 _WEEK_NS = 604_800_000_000_000
 _TYPICAL_TRAVEL_S = 0.075
 _MARGIN = 0.02  # of the sine of the elevation, for the rough look at 75 ms
 _HALF_STEP_S = 0.5
+# The sine of an elevation changes no faster: 4 km/s seen from 19 000 km is half of the first;
+# the second, per m/s of the receiver, is its motion over that and over the Earth's radius, twice.
+_FASTEST_SINE = 4e-4
+_FASTEST_SINE_MOVING = 4e-7
 _KM = 1e-3
 _TWICE_SCHWARZSCHILD_M = 2.0 * 3.986004418e14 / (SPEED_OF_LIGHT_M_S * SPEED_OF_LIGHT_M_S)
 
@@ -48,6 +59,7 @@ SIGHT_DTYPE: Final = np.dtype(
         ("ionosphere_m", "<f8"),  # on GPS L1
         ("ionosphere_rate", "<f8"),
         ("neutral_m", "<f8"),  # troposphere, and Shapiro's delay where it is wanted
+        ("shapiro_m", "<f8"),  # the latter alone
         ("neutral_rate", "<f8"),
     ],
     align=True,
@@ -67,6 +79,18 @@ ATMOSPHERE_DTYPE: Final = np.dtype(
         ("wet_spacing", "<f8"),  # s between nodes
         ("origin", "<f8", 3),  # m, ECEF, where gradients are nought
         ("axes", "<f8", (3, 3)),  # east, north, up there
+        ("origin_latitude", "<f8"),  # rad, the same place
+        ("origin_longitude", "<f8"),
+        ("fields", "<i8"),  # 1 where the ionosphere has one of the next three
+        ("slope", "<f8", 2),  # to the east and north, vertical, m on L1 per m
+        ("wave", "<f8", 4),  # amplitude (m), wave numbers (rad/m), rate (rad/s)
+        # height (m), direction's east and north part, speed (m/s), place at the start and
+        # width (m)
+        ("front", "<f8", 6),
+        ("wet_gradient", "<f8", 2),  # m, to the east and north
+        ("wet_fields", "<i8"),  # 1 where the troposphere has one of the next two
+        ("wet_slope", "<f8", 2),  # zenith, m per m
+        ("wet_waves", "<f8", (WAVES, 5)),  # of :func:`sky_fields.random_field`
     ],
     align=True,
 )
@@ -176,21 +200,30 @@ def delays(
             atmosphere["alpha"], atmosphere["beta"], latitude, longitude, elevation, azimuth,
             of_week,
         )  # fmt: skip
-        _, _, slant = beidou_pierce_point(latitude, longitude, elevation, azimuth)
+        phi, lam, slant = beidou_pierce_point(latitude, longitude, elevation, azimuth)
         at = 1.0 + since_s / atmosphere["ionosphere_spacing"]
         o = atmosphere["origin"]
         east, north, _ = rotate3(atmosphere["axes"], x - o[0], y - o[1], z - o[2])
         vertical = cubic(residuals[0], at) + _KM * (
             east * cubic(residuals[1], at) + north * cubic(residuals[2], at)
         )
+        if atmosphere["fields"] != 0:
+            vertical += vertical_ionosphere(atmosphere, phi, lam, since_s)
         dispersive = atmosphere["scale"] * model + slant * vertical
     neutral = 0.0
     if atmosphere["troposphere"] != 0:
         hydrostatic, zenith_wet = zenith_standard(latitude, height, atmosphere["humidity"])
         zenith_wet += cubic(wet, 1.0 + since_s / atmosphere["wet_spacing"])
+        if atmosphere["wet_fields"] != 0:
+            o = atmosphere["origin"]
+            east, north, _ = rotate3(atmosphere["axes"], x - o[0], y - o[1], z - o[2])
+            zenith_wet += zenith_wet_field(atmosphere, east, north, since_s)
         neutral = hydrostatic * niell_hydrostatic(
             elevation, latitude, height, day_of_year(time_ns)
         ) + zenith_wet * niell_wet(elevation, latitude)
+        gradient = atmosphere["wet_gradient"]
+        if gradient[0] != 0.0 or gradient[1] != 0.0:
+            neutral += gradient_delay(gradient[0], gradient[1], elevation, azimuth)
     if atmosphere["shapiro"] != 0:
         neutral += shapiro(x, y, z, state)
     return dispersive, neutral
@@ -202,6 +235,7 @@ def see(
     atmosphere: Array,
     residuals: Array,
     wet: Array,
+    limit_s: float,
     times_ns: Array,
     offsets_s: Array,
     start_ns: int,
@@ -215,13 +249,15 @@ def see(
 
     Parameters
     ----------
-    satellite : array (1,) of EPHEMERIS_DTYPE
-        Its true orbit and clock; not GLONASS.
+    satellite : array (n,) of EPHEMERIS_DTYPE
+        Its true orbit and clock, as in :mod:`replay.kernels.true_orbit`.
     atmosphere : array (1,) of ATMOSPHERE_DTYPE
     residuals, wet : float64 arrays (3, n) and (n,)
         As in :func:`delays`.
+    limit_s : float, s
+        How far from its reference time a record of the orbit holds.
     times_ns, offsets_s : int64 and float64 arrays (e,)
-        True times of reception, GPS.
+        True times of reception, GPS, rising.
     start_ns : int, ns
         Time of the third node.
     positions, velocities : float64 arrays (e, 3), m and m/s, ECEF
@@ -231,24 +267,37 @@ def see(
     sights : array (e,) of SIGHT_DTYPE
         Written.
     """
-    record = satellite[0]
     air = atmosphere[0]
     state = np.empty(8)
+    other = np.empty(8)
     moved = np.empty(8)
     axes = np.empty((3, 3))
     h = _HALF_STEP_S
+    fastest = 0.0
+    for k in range(velocities.shape[0]):
+        v = velocities[k]
+        fastest = max(fastest, v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    fastest = _FASTEST_SINE + _FASTEST_SINE_MOVING * sqrt(fastest)
+    below_until = times_ns[0] if times_ns.shape[0] > 0 else 0
     for k in range(times_ns.shape[0]):
         out = sights[k]
         out["seen"] = 0
         time_ns, offset = times_ns[k], offsets_s[k]
+        if time_ns < below_until:
+            continue
         r, v = positions[k], velocities[k]
         x, y, z = r[0], r[1], r[2]
-        satellite_state(record, time_ns, offset - _TYPICAL_TRAVEL_S, state)
+        which, _, _ = between_messages(satellite, time_ns, offset, limit_s)
+        if which < 0:
+            continue
+        satellite_state(satellite[which], time_ns, offset - _TYPICAL_TRAVEL_S, state)
         enu_axes(x, y, z, axes)
         _, ux, uy, uz = line_of_sight(x, y, z, state[0], state[1], state[2])
-        if axes[2, 0] * ux + axes[2, 1] * uy + axes[2, 2] * uz < sine_of_mask - _MARGIN:
+        missing = sine_of_mask - _MARGIN - (axes[2, 0] * ux + axes[2, 1] * uy + axes[2, 2] * uz)
+        if missing > 0.0:
+            below_until = time_ns + int(missing / fastest * 1e9)
             continue
-        travel = state_at_reception(record, time_ns, offset, x, y, z, state)
+        travel = true_state(satellite, time_ns, offset, limit_s, x, y, z, state, other)
         _, ux, uy, uz = line_of_sight(x, y, z, state[0], state[1], state[2])
         elevation, azimuth = elevation_azimuth(axes, ux, uy, uz)
         if elevation < mask_rad:
@@ -264,6 +313,7 @@ def see(
         iono, neutral = delays(air, residuals, wet, time_ns, offset, since, x, y, z, state, axes)
         out["ionosphere_m"] = iono
         out["neutral_m"] = neutral
+        out["shapiro_m"] = shapiro(x, y, z, state) if air["shapiro"] != 0 else 0.0
         iono_change = 0.0
         neutral_change = 0.0
         for side in (-1.0, 1.0):

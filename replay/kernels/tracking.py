@@ -64,6 +64,10 @@ MEASUREMENT_DTYPE: Final = np.dtype(
         ("flag", "<i8"),  # of RINEX: 1 is loss of lock
         ("ambiguity", "<i8"),  # cycles, what is in the carrier phase
         ("slip", "<i8"),  # cycles, what was added to it at this epoch within an arc
+        ("code_noise_m", "<f8"),  # what is in the pseudorange
+        ("code_multipath_m", "<f8"),
+        ("carrier_noise_m", "<f8"),  # what is in the carrier phase
+        ("carrier_multipath_m", "<f8"),
     ],
     align=True,
 )
@@ -231,12 +235,18 @@ def track(
         free = c * (b + sight["travel_s"] - sight["clock_s"]) + sight["neutral_m"]
         delay = s["ionosphere"] * sight["ionosphere_m"]
         code = free + delay + s["code_delay_m"]
-        code += s["code_sigma_m"] * noisy * n[CODE]
-        code += s["code_multipath_m"] * weight * n[CODE_MULTIPATH]
+        noise = s["code_sigma_m"] * noisy * n[CODE]
+        multipath = s["code_multipath_m"] * weight * n[CODE_MULTIPATH]
+        code += noise
+        code += multipath
         if by_reflection:
             detour = n[CODE_MULTIPATH]
-            code += s["reflection_m"] * 1.2533141373155001 * (detour if detour > 0.0 else -detour)
+            detour = s["reflection_m"] * 1.2533141373155001 * (detour if detour > 0.0 else -detour)
+            code += detour
+            multipath += detour
         m["code"] = 1
+        m["code_noise_m"] = noise
+        m["code_multipath_m"] = multipath
         m["pseudorange_m"] = code
         m["cn0_dbhz"] = strength
         if by_reflection or strength < s["carrier_threshold_dbhz"]:
@@ -261,8 +271,12 @@ def track(
                 if u[FLAG] < s["flag_probability"]:
                     m["flag"] = 1
         phase = free - delay
-        phase += s["carrier_sigma_m"] * noisy * n[CARRIER]
-        phase += s["carrier_multipath_m"] * weight * n[CARRIER_MULTIPATH]
+        noise = s["carrier_sigma_m"] * noisy * n[CARRIER]
+        multipath = s["carrier_multipath_m"] * weight * n[CARRIER_MULTIPATH]
+        phase += noise
+        phase += multipath
+        m["carrier_noise_m"] = noise
+        m["carrier_multipath_m"] = multipath
         # Per second of the receiver's own clock, as it counts.
         pace = 1.0 - b_rate
         rate = c * (1.0 - (1.0 + sight["clock_drift"]) * (1.0 - sight["travel_rate"]) * pace)

@@ -1,11 +1,9 @@
-"""Motion of a simulated road vehicle and what perfect sensors in it would read.
+"""Motion of a simulated car, aircraft or walker and what perfect sensors there would read.
 
-Speed, heading and grade are polynomials in time, piece by piece: the rate of each
-goes from one value to another along a septic smoothstep, so that rates are three
-times and values four times continuously differentiable. Velocity and attitude are
-closed functions of them; the position is the integral of the velocity in ECEF
-(Runge-Kutta of order 4), and inertial increments are integrals of the exact
-specific force and angular rate (Gauss-Legendre of order 6).
+Velocity and attitude are closed functions of time (:mod:`replay.kernels.manoeuvres`);
+the position is the integral of the velocity in ECEF (Runge-Kutta of order 4), and
+inertial increments are integrals of the exact specific force and angular rate
+(Gauss-Legendre of order 6).
 """
 
 from typing import Any
@@ -22,6 +20,7 @@ from replay.kernels.earth import (
     surface_normal,
 )
 from replay.kernels.elementary import sincos, sqrt
+from replay.kernels.manoeuvres import MOTION_DTYPE, move, piece_at
 from replay.kernels.rotation import (
     euler_from_matrix,
     matrix_from_euler,
@@ -30,19 +29,6 @@ from replay.kernels.rotation import (
     rotate3_back,
 )
 from replay.kernels.types import Array, Record
-
-# One piece of the motion. The three quantities are speed (m/s), heading (rad, clockwise
-# from north) and grade (rad, up); rates are theirs per second.
-PIECE_DTYPE = np.dtype(
-    [
-        ("start", "<f8"),  # s
-        ("duration", "<f8"),  # s, more than zero
-        ("value", "<f8", 3),  # at the start
-        ("rate", "<f8", 3),  # at the start
-        ("change", "<f8", 3),  # of the rate until the end
-    ],
-    align=True,
-)
 
 # Where the vehicle is at a moment; the IMU is the point that moves.
 POSE_DTYPE = np.dtype(
@@ -57,78 +43,10 @@ POSE_DTYPE = np.dtype(
     align=True,
 )
 
-# Motion in local axes at one moment; scratch.
-_MOTION_DTYPE = np.dtype(
-    [
-        ("v", "<f8", 3),  # m/s, east, north, up
-        ("a", "<f8", 3),  # m/s^2, derivative of the components of v
-        ("angle", "<f8", 3),  # rad: roll, pitch, heading
-        ("angle_rate", "<f8", 3),  # rad/s
-        ("w", "<f8", 3),  # rad/s, body relative to inertial, body axes
-        ("f", "<f8", 3),  # m/s^2, body axes
-        ("C", "<f8", (3, 3)),  # body to north, east, down
-        ("x", "<f8", 3),  # m, ECEF
-    ],
-    align=True,
-)
-
 # Nodes and weights of Gauss and Legendre's rule with three points on [0, 1].
 _NODE = 0.5 * sqrt(0.6)
-_NODES = (0.5 - _NODE, 0.5, 0.5 + _NODE)
-_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-
-
-@njit(cache=True)
-def _piece_at(pieces: Array, t: float, guess: int) -> int:
-    """Number of the piece in which a time (s) lies, looking onward from a guess."""
-    k = guess
-    while k + 1 < pieces.shape[0] and pieces[k + 1]["start"] <= t:
-        k += 1
-    return k
-
-
-@njit(cache=True)
-def _profile(piece: Record, t: float, i: int) -> tuple[float, float, float]:
-    """Value, first and second derivative of quantity `i` at a time (s) of a piece."""
-    elapsed = t - piece["start"]
-    T = piece["duration"]
-    x = min(1.0, max(0.0, elapsed / T))
-    y = x * x
-    y4 = y * y
-    rise = y4 * (35.0 - x * (84.0 - x * (70.0 - x * 20.0)))
-    integral = y4 * x * (7.0 - x * (14.0 - x * (10.0 - x * 2.5)))
-    z = x * (1.0 - x)
-    slope = 140.0 * z * z * z
-    change = piece["change"][i]
-    value = piece["value"][i] + piece["rate"][i] * elapsed + change * (T * integral)
-    return value, piece["rate"][i] + change * rise, change * slope / T
-
-
-@njit(cache=True)
-def _move(piece: Record, t: float, lean: Array, m: Record) -> None:
-    """Velocity, its derivative and attitude angles with their rates, in local axes.
-
-    `lean` holds roll per lateral and pitch per forward acceleration (rad per m/s^2):
-    a body on springs rolls out of the turn and dives when it brakes.
-    """
-    speed, pace, pace_rate = _profile(piece, t, 0)
-    heading, turn, turn_rate = _profile(piece, t, 1)
-    grade, rise, _ = _profile(piece, t, 2)
-    sh, ch = sincos(heading)
-    sg, cg = sincos(grade)
-    v, a, angle, rate = m["v"], m["a"], m["angle"], m["angle_rate"]
-    v[0] = speed * (cg * sh)
-    v[1] = speed * (cg * ch)
-    v[2] = speed * sg
-    a[0] = pace * (cg * sh) + speed * (turn * (cg * ch) - rise * (sg * sh))
-    a[1] = pace * (cg * ch) - speed * (turn * (cg * sh) + rise * (sg * ch))
-    a[2] = pace * sg + speed * (rise * cg)
-    angle[0] = -lean[0] * (speed * turn)
-    angle[1] = grade + lean[1] * pace
-    angle[2] = heading
-    rate[0] = -lean[0] * (pace * turn + speed * turn_rate)
-    rate[1] = rise + lean[1] * pace_rate
-    rate[2] = turn
+NODES = (0.5 - _NODE, 0.5, 0.5 + _NODE)
+WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @njit(cache=True)
@@ -194,7 +112,7 @@ def _to_ecef(x: float, y: float, z: float, v: Array, out: Array) -> None:
 def _step(
     pieces: Array,
     first: int,
-    lean: Array,
+    body: Record,
     t: float,
     h: float,
     r: Array,
@@ -209,25 +127,25 @@ def _step(
     pieces : array of PIECE_DTYPE
     first : int
         Piece in which `t` lies.
-    lean : float64 array (2,)
+    body : record of BODY_DTYPE
     t, h : float, s
     r : float64 array (3,), m, ECEF
-    m : record of _MOTION_DTYPE
+    m : record of MOTION_DTYPE
         Overwritten.
     k : float64 array (5, 3), m/s, ECEF
         Overwritten.
     out : float64 array (3,), m, ECEF
     """
     v = m["v"]
-    _move(pieces[first], t, lean, m)
+    move(pieces[first], t, body, m)
     _to_ecef(r[0], r[1], r[2], v, k[0])
-    middle = _piece_at(pieces, t + 0.5 * h, first)
-    _move(pieces[middle], t + 0.5 * h, lean, m)
+    middle = piece_at(pieces, t + 0.5 * h, first)
+    move(pieces[middle], t + 0.5 * h, body, m)
     for i in range(1, 3):
         s = 0.5 * h
         p = k[i - 1]
         _to_ecef(r[0] + s * p[0], r[1] + s * p[1], r[2] + s * p[2], v, k[i])
-    _move(pieces[_piece_at(pieces, t + h, middle)], t + h, lean, m)
+    move(pieces[piece_at(pieces, t + h, middle)], t + h, body, m)
     p = k[2]
     _to_ecef(r[0] + h * p[0], r[1] + h * p[1], r[2] + h * p[2], v, k[3])
     for j in range(3):
@@ -238,7 +156,7 @@ def _step(
 @njit(cache=True)
 def sense_motion(
     pieces: Array,
-    lean: Array,
+    body: Record,
     step: float,
     positions: Array,
     rates: Array,
@@ -251,8 +169,7 @@ def sense_motion(
     ----------
     pieces : array of PIECE_DTYPE
         In the order of time; the last one goes on beyond its end.
-    lean : float64 array (2,), rad per m/s^2
-        Roll per lateral, pitch per forward acceleration.
+    body : record of BODY_DTYPE
     step : float, s
     positions : float64 array (n + 1, 3), m, ECEF
         The first row is the start; the others are written.
@@ -267,17 +184,17 @@ def sense_motion(
     x, w, f = m["x"], m["w"], m["f"]
     for n in range(rates.shape[0]):
         t = n * step
-        piece = _piece_at(pieces, t, piece)
+        piece = piece_at(pieces, t, piece)
         r = positions[n]
         end = positions[n + 1]
-        _step(pieces, piece, lean, t, step, r, m, k, end)
+        _step(pieces, piece, body, t, step, r, m, k, end)
         for i in range(3):
             rates[n, i] = 0.0
             forces[n, i] = 0.0
         for node in range(3):
-            s = _NODES[node]
+            s = NODES[node]
             at = t + s * step
-            _move(pieces[_piece_at(pieces, at, piece)], at, lean, m)
+            move(pieces[piece_at(pieces, at, piece)], at, body, m)
             _attitude(m)
             # Cubic Hermite between the ends: off by less than a nanometre at 20 Hz.
             b = s * s * (3.0 - 2.0 * s)
@@ -287,14 +204,14 @@ def sense_motion(
                 x[i] = r[i] + b * (end[i] - r[i]) + c * k[0, i] + d * k[4, i]
             _sense(m)
             for i in range(3):
-                rates[n, i] += _WEIGHTS[node] * w[i]
-                forces[n, i] += _WEIGHTS[node] * f[i]
+                rates[n, i] += WEIGHTS[node] * w[i]
+                forces[n, i] += WEIGHTS[node] * f[i]
 
 
 @njit(cache=True)
 def poses_at(
     pieces: Array,
-    lean: Array,
+    body: Record,
     step: float,
     positions: Array,
     times: Array,
@@ -305,7 +222,7 @@ def poses_at(
 
     Parameters
     ----------
-    pieces, lean, step, motion
+    pieces, body, step, motion
         As in :func:`sense_motion`.
     positions : float64 array (n + 1, 3), m, ECEF
     times : float64 array (m,), s
@@ -323,10 +240,10 @@ def poses_at(
         t = times[n]
         grid = min(last, int(t / step))
         base = grid * step
-        piece = _piece_at(pieces, base, piece)
+        piece = piece_at(pieces, base, piece)
         pose = poses[n]
         r, w = pose["r"], pose["w_eb"]
-        _step(pieces, piece, lean, base, t - base, positions[grid], m, k, r)
+        _step(pieces, piece, body, base, t - base, positions[grid], m, k, r)
         _attitude(m)
         _, _, _, _, te, tn, tu = _local_frame(r, m["v"])
         e0, e1, e2 = rotate3_back(m["C"], tn, te, -tu)
@@ -350,7 +267,7 @@ def poses_at(
 
 def new_motion() -> np.ndarray[Any, Any]:
     """Scratch of one record for the functions above."""
-    return np.zeros(1, dtype=_MOTION_DTYPE)
+    return np.zeros(1, dtype=MOTION_DTYPE)
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ slot, eccentricities, clocks, group delays and harmonic terms are drawn. The ele
 hold at the beginning of the week, so that the sky repeats with the constellation and
 not with the calendar. Consecutive messages of a satellite are one orbit: only the
 reference time moves, and with it what the formulas let run on (anomaly, node, clock).
-GLONASS is not made: its message is a state vector, not an orbit.
+GLONASS, whose message is a state vector, is in :mod:`replay.simulate.glonass`.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from replay.kernels.earth import SEMI_MAJOR_AXIS_M
 from replay.kernels.ephemeris import EPHEMERIS_DTYPE
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, is_geostationary, orbit_constants
 from replay.log.columns import Columns
+from replay.simulate import glonass
 from replay.simulate.noise import normals, uniforms
 
 Records = npt.NDArray[np.void]
 
-SYSTEMS: Final = "GECJ"
+SYSTEMS: Final = "GRECJ"
 
 _DEG: Final = math.pi / 180.0
 _TURN: Final = 2.0 * math.pi
@@ -76,6 +77,7 @@ _HABITS: Final = {
     "E": (1800, 600, 0, 3.12, 1e-3, 3e-12, 3e-9, 3e-4),
     "C": (3600, 60, 0, 2.0, 3e-4, 1e-11, 8e-9, 1e-3),
     "J": (3600, 0, 2 * _HOUR_S, 2.0, 2e-4, 3e-12, 3e-9, 0.0),
+    "R": (glonass.EVERY_S, glonass.SENT_S, 0, 0.0, 0.0, 0.0, 0.0, 0.0),
 }
 _GALILEO_INAV: Final = 517  # RINEX 3.05, table A8: I/NAV E1-B and E5b-I, clock of E5b and E1
 _GPS_L5: Final = (1, 3, 4, 6, 8, 9, 10, 11, 14, 18, 23, 24, 25, 26, 27, 28, 30, 32)
@@ -95,6 +97,8 @@ def sends(record: Any, signal: str) -> bool:
         return prn in _GPS_L5
     if system == "G" and signal[0] == "2" and signal[1] in "SLX":
         return prn in _GPS_L2C
+    if system == "R":
+        return signal[0] in "12"  # as M satellites do: no CDMA
     if system == "C":
         old = prn <= _LAST_BEIDOU_2
         if signal == "7I":
@@ -112,14 +116,17 @@ def constellation(systems: Iterable[str], seed: int, start_ns: int) -> Records:
         RINEX letters out of SYSTEMS.
     seed : int
     start_ns : int, ns, GPS
-        Its week counts.
+        Its week counts; the messages of GLONASS are those of that time.
 
     Returns
     -------
     array (n,) of EPHEMERIS_DTYPE, by system as given and number
     """
-    made = []
+    made: list[Any] = []
     for system in systems:
+        if system == "R":
+            made += glonass.satellites(seed, start_ns)
+            continue
         origin = start_ns // time.NS_PER_WEEK * time.NS_PER_WEEK
         origin += _BEIDOU_S * time.NS_PER_S if system == "C" else 0
         slots = sorted(_SLOTS[system]())
@@ -236,6 +243,8 @@ def _wrap(angle: float) -> float:
 
 def refer(record: Any, toe_ns: int) -> Any:
     """The same orbit and clock with another reference time."""
+    if chr(int(record["system"])) == "R":
+        return glonass.refer(record, toe_ns)
     moved = record.copy()
     system = int(record["system"])
     elapsed = (toe_ns - int(record["toe_ns"])) / time.NS_PER_S
@@ -308,7 +317,8 @@ def messages(satellites: Records, start_ns: int, end_ns: int) -> Columns:
         while origin + number * every + delay <= end_ns:
             message = refer(satellite, origin + number * every)
             message["transmitted_ns"] = int(message["toe_ns"]) + delay
-            message["iode"] = message["iodc"] = number % (_DAY_S // every_s) + 1
+            if chr(int(satellite["system"])) != "R":
+                message["iode"] = message["iodc"] = number % (_DAY_S // every_s) + 1
             sent.append(message)
             number += 1
     table = np.array(sent, dtype=EPHEMERIS_DTYPE)
@@ -318,17 +328,26 @@ def messages(satellites: Records, start_ns: int, end_ns: int) -> Columns:
     values: dict[str, npt.NDArray[Any]] = {
         "satellite": np.array([name_of(record) for record in table], dtype="S3")
     }
-    for name in _FIELDS:
-        integer = name in ("iode", "iodc", "health", "source")
+    kepler = table["system"] != ord("R")
+    fields = _FIELDS if kepler.all() else (*_FIELDS, *_STATE)
+    for name in fields:
+        integer = name in ("iode", "iodc", "health", "source", "frequency_channel")
         values[name] = np.ascontiguousarray(
             table[name], dtype=np.int32 if integer else table[name].dtype
         )
-    return Columns.build(table["transmitted_ns"], values, log_time_ns=log_ns)
+    present = (
+        {} if kepler.all() else dict.fromkeys(_KEPLER, kepler) | dict.fromkeys(_STATE, ~kepler)
+    )
+    return Columns.build(table["transmitted_ns"], values, log_time_ns=log_ns, present=present)
 
 
-_FIELDS: Final = (
+_COMMON: Final = (
     "toe_ns", "toc_ns", "transmitted_ns", "iode", "iodc", "health", "source", "accuracy_m",
-    "fit_s", "af0", "af1", "af2", "group_delay_1_s", "group_delay_2_s", "toe_s", "sqrt_a",
-    "eccentricity", "i0", "omega0", "omega", "m0", "delta_n", "omega_dot", "i_dot", "cuc", "cus",
-    "crc", "crs", "cic", "cis",
+    "fit_s", "af0", "af1", "af2", "group_delay_1_s", "group_delay_2_s", "toe_s",
 )  # fmt: skip
+_KEPLER: Final = (
+    "sqrt_a", "eccentricity", "i0", "omega0", "omega", "m0", "delta_n", "omega_dot", "i_dot",
+    "cuc", "cus", "crc", "crs", "cic", "cis",
+)  # fmt: skip
+_FIELDS: Final = (*_COMMON, *_KEPLER)
+_STATE: Final = ("position_m", "velocity_m_s", "acceleration_m_s2", "frequency_channel")

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from replay.configuration import STANDARD_GRAVITY_M_S2, Table, merge
-from replay.simulate.scenario import Settings, tables_toml
+from replay.simulate.scenario import tables_toml
+from replay.simulate.settings import Settings
 from replay.simulate.sky import Receiver
 
 # What is left to a perfect unit: a filter needs some noise, and integration has its own.
@@ -21,6 +22,7 @@ _LEAST_ACCEL_NOISE: Final = 1e-6  # m/s/sqrt(s)
 _LEAST_GYRO_BIAS: Final = 1e-7  # rad/s
 _LEAST_ACCEL_BIAS: Final = 1e-4  # m/s^2
 _LEAST_TILT: Final = 1e-4  # rad
+_FLYING_TILT: Final = 0.01  # rad
 _LEAST_REST: Final = 1e-3  # m/s^2: rest ends before the detector sees that it does
 
 _REST_TIME_S: Final = 5.0
@@ -33,7 +35,10 @@ _LEAST_STOP_RATE: Final = 1e-3  # rad/s
 _STOP_SPEED: Final = 0.3  # m/s: simulated braking is as smooth as rest, but for its last metre
 _COURSE_SPEED: Final = 3.0  # m/s
 _LEAST_HEADING: Final = 0.01  # rad: a course is the heading but for the body's lean
+_WALKING_SPEED: Final = 1.0  # m/s
+_WALKING_HEADING: Final = 0.15  # rad: steps sway, and the body turns about its course
 _SLIP: Final = 0.02  # m/s
+_HOUR_S: Final = 3600.0
 _BRAKING_M_S: Final = 15.0  # at 1 m/s^2 from this speed the lean shows as so much slip
 
 
@@ -43,15 +48,25 @@ def fitting_defaults(settings: Settings) -> Table:
     receiver = settings.gnss.errors
     gyro_noise = max(errors.gyro_noise, _LEAST_GYRO_NOISE)
     accel_noise = max(errors.accel_noise, _LEAST_ACCEL_NOISE)
-    gyro_sigma, gyro_tau = _one_process(errors.gyro_bias, errors.gyro_drift, errors.gyro_drift_tau)
+    gyro_sigma, gyro_tau = _one_process(
+        errors.gyro_bias, errors.gyro_drift, errors.gyro_drift_tau, errors.gyro_walk
+    )
     accel_sigma, accel_tau = _one_process(
-        errors.accel_bias, errors.accel_drift, errors.accel_drift_tau
+        errors.accel_bias, errors.accel_drift, errors.accel_drift_tau, errors.accel_walk
     )
     accel_sigma = max(accel_sigma, _LEAST_ACCEL_BIAS)
     scaled = errors.gyro_scale > 0.0 or errors.accel_scale > 0.0
     gyro_at_rest = _root_sum_square(gyro_noise / math.sqrt(_REST_TIME_S), errors.gyro_drift)
     accel_at_rest = _root_sum_square(accel_noise / math.sqrt(_REST_TIME_S), errors.accel_drift)
     lean = settings.vehicle.pitch_per_g / STANDARD_GRAVITY_M_S2
+    # In flight nothing is at rest: the attitude of straight and level flight is all there is.
+    flying = settings.start.speed > 0.0
+    tilt = _FLYING_TILT if flying else max(accel_sigma / STANDARD_GRAVITY_M_S2, _LEAST_TILT)
+    gyro_known = gyro_sigma if flying else 2.0 * gyro_at_rest
+    walking = settings.vehicle.kind == "foot"
+    course_speed = _WALKING_SPEED if walking else _COURSE_SPEED
+    # Only of wheels is known that they neither slip nor leave the road, and where they are.
+    wheels = settings.vehicle.kind == "road" and not settings.trajectory.log
     return {
         "filter": {
             "states": 21 if scaled else 15,
@@ -67,13 +82,14 @@ def fitting_defaults(settings: Settings) -> Table:
         "alignment": {
             "rest_time": _REST_TIME_S,
             "rest_sigma": max(accel_at_rest, _LEAST_REST),
-            "course_speed": _COURSE_SPEED,
-            "tilt_sigma": max(accel_sigma / STANDARD_GRAVITY_M_S2, _LEAST_TILT),
+            "course_speed": course_speed,
+            "tilt_sigma": tilt,
             "heading_sigma": _root_sum_square(
-                receiver.horizontal_velocity_noise / _COURSE_SPEED, _LEAST_HEADING
+                receiver.horizontal_velocity_noise / course_speed,
+                _WALKING_HEADING if walking else _LEAST_HEADING,
             ),
             "velocity_sigma": max(receiver.vertical_velocity_noise, 0.02),
-            "gyro_bias_sigma": _three(max(2.0 * gyro_at_rest, _LEAST_GYRO_BIAS)),
+            "gyro_bias_sigma": _three(max(gyro_known, _LEAST_GYRO_BIAS)),
             "accel_bias_sigma": _three(accel_sigma),
         },
         "gnss": {"latency": settings.gnss.latency},
@@ -91,7 +107,7 @@ def fitting_defaults(settings: Settings) -> Table:
             "rate_sigma": _three(gyro_noise / math.sqrt(_INTERVAL_S)),
         },
         "non_holonomic": {
-            "enabled": True,
+            "enabled": wheels,
             "right_sigma": _SLIP,
             "down_sigma": _SLIP + _BRAKING_M_S * lean,
             "lever_arm": _three(0.0),  # the IMU is the point that moves along the road
@@ -128,13 +144,16 @@ def _root_sum_square(a: float, b: float) -> float:
     return math.sqrt(a * a + b * b)
 
 
-def _one_process(bias: float, drift: float, tau_s: float) -> tuple[float, float]:
-    """Deviation and correlation time of one process for a constant and a drifting part.
+def _one_process(bias: float, drift: float, tau_s: float, walk: float) -> tuple[float, float]:
+    """Deviation and correlation time of one process for constant, drifting and walking parts.
 
-    The deviation is that of the sum; the noise that drives it, 2 sigma^2 / tau, is that
-    of the drift. A correlation time of 0 is a constant.
+    The deviation is that of the sum after an hour; the noise that drives it,
+    2 sigma^2 / tau, is that of drift and walk. A correlation time of 0 is a constant.
     """
-    variance = bias * bias + drift * drift
+    variance = bias * bias + drift * drift + walk * walk
+    if walk > 0.0:
+        density = walk * walk / _HOUR_S + (2.0 * drift * drift / tau_s if drift > 0.0 else 0.0)
+        return math.sqrt(variance), 2.0 * variance / density
     if drift == 0.0:
         return math.sqrt(variance), 0.0
     return math.sqrt(variance), tau_s * variance / (drift * drift)

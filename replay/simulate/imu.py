@@ -1,7 +1,9 @@
 """What an imperfect inertial unit makes of perfect rates and specific forces.
 
-measured = (I + scale + misalignment) true + bias + drift + noise + vibration, then
-rounded to the resolution. Scale and bias have the sign that the filter's states have.
+measured = (I + scale + misalignment) true + bias + drift + walk + noise + vibration, for
+gyros also g-sensitivity times the specific force; then rounded, either each value to the
+resolution or their sum to whole increments. Scale and bias have the sign that the
+filter's states have.
 """
 
 from __future__ import annotations
@@ -13,10 +15,11 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 
-from replay.configuration import Section, quantity
+from replay.configuration import STANDARD_GRAVITY_M_S2, Section, quantity
 from replay.errors import ConfigurationError
 from replay.simulate.noise import Floats, correlated, normals
 
+_HOUR_S: Final = 3600.0
 _MOVING_M_S: Final = 1.0  # at this speed vibration has its full size
 
 
@@ -31,9 +34,16 @@ class ImuErrors(Section, frozen=True):
     gyro_drift_tau: Annotated[float, quantity("s", "its correlation time")] = 300.0
     accel_drift: Annotated[float, quantity("m/s^2", "Gauss-Markov deviation")] = 0.0
     accel_drift_tau: Annotated[float, quantity("s", "its correlation time")] = 300.0
+    gyro_walk: Annotated[float, quantity("rad/s", "random walk of the bias in an hour")] = 0.0
+    accel_walk: Annotated[float, quantity("m/s^2", "random walk of the bias in an hour")] = 0.0
     gyro_scale: Annotated[float, quantity("1", "drawn once")] = 0.0
     accel_scale: Annotated[float, quantity("1", "drawn once")] = 0.0
     misalignment: Annotated[float, quantity("rad", "of each axis to each other")] = 0.0
+    gyro_g_sensitivity: Annotated[
+        float, quantity("rad/s", "at 1 g, of each gyro to each axis of force; drawn once")
+    ] = 0.0
+    gyro_increment: Annotated[float, quantity("rad", "of whole pulses; 0 is none")] = 0.0
+    accel_increment: Annotated[float, quantity("m/s", "of whole pulses; 0 is none")] = 0.0
     gyro_resolution: Annotated[float, quantity("rad/s", "last digit; 0 is none")] = 0.0
     accel_resolution: Annotated[float, quantity("m/s^2", "last digit; 0 is none")] = 0.0
     vibration_velocity: Annotated[float, quantity("m/s", "of the moving vehicle")] = 0.0
@@ -130,7 +140,7 @@ def check(errors: ImuErrors) -> None:
     Raises
     ------
     ConfigurationError
-        For a negative number, or a drift without a correlation time.
+        For a negative number, a drift without a correlation time, two ways of rounding.
     """
     for name in errors.__struct_fields__:
         if not getattr(errors, name) >= 0.0:
@@ -142,6 +152,11 @@ def check(errors: ImuErrors) -> None:
             raise ConfigurationError(
                 f"imu.errors.{sensor}_drift_tau is 0 but the drift is not",
                 mend=f"give a correlation time, or use {sensor}_bias for a constant",
+            )
+        if getattr(errors, f"{sensor}_increment") > 0.0 < getattr(errors, f"{sensor}_resolution"):
+            raise ConfigurationError(
+                f"imu.errors has {sensor}_increment and {sensor}_resolution",
+                mend="a unit sends whole pulses or rounded values: leave one of them out",
             )
 
 
@@ -160,9 +175,21 @@ def measure(
     errors : ImuErrors
     seed : int
     """
+    if errors.gyro_g_sensitivity > 0.0:
+        rates = rates + _g_sensitivity(forces, errors.gyro_g_sensitivity, seed)
     gyro, gyro_bias = _sensor("gyro", rates, speeds, interval_s, errors, seed)
     accel, accel_bias = _sensor("accel", forces, speeds, interval_s, errors, seed)
     return ImuData(gyro, accel, gyro_bias, accel_bias)
+
+
+def _g_sensitivity(forces: Floats, size: float, seed: int) -> Floats:
+    """What specific force does to three gyros (n, 3), rad/s."""
+    factors = (size / STANDARD_GRAVITY_M_S2) * normals(seed, "imu.gyro.g_sensitivity", 3)
+    out = np.zeros_like(forces)
+    for i in range(3):
+        for j in range(3):
+            out[:, i] += factors[i, j] * forces[:, j]
+    return out
 
 
 def _sensor(
@@ -188,6 +215,10 @@ def _sensor(
         interval_s=interval_s,
     )
     bias += getattr(errors, f"{name}_bias") * normals(seed, f"{source}.bias", 1)[0]
+    walk = getattr(errors, f"{name}_walk")
+    if walk > 0.0:
+        steps = normals(seed, f"{source}.walk", rows)
+        bias += (walk * math.sqrt(interval_s / _HOUR_S)) * np.cumsum(steps, axis=0)
     measured += bias
     density = getattr(errors, f"{name}_noise")
     if density > 0.0:
@@ -198,7 +229,17 @@ def _sensor(
     resolution = getattr(errors, f"{name}_resolution")
     if resolution > 0.0:
         measured = np.rint(measured / resolution) * resolution
+    increment = getattr(errors, f"{name}_increment")
+    if increment > 0.0:
+        measured = _count(measured, interval_s, increment)
     return measured, bias
+
+
+def _count(values: Floats, interval_s: float, increment: float) -> Floats:
+    """Values (n, 3) as whole pulses per interval; what is left of one goes on to the next."""
+    pulses = np.rint(np.cumsum(values * (interval_s / increment), axis=0))
+    pulses[1:] -= pulses[:-1].copy()
+    return np.asarray(pulses * (increment / interval_s))
 
 
 def _vibration(size: float, speeds: Floats, interval_s: float, seed: int, source: str) -> Floats:

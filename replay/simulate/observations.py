@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from replay import channels, time
 from replay.errors import ConfigurationError
+from replay.gnss.ephemerides import ephemeris_records
 from replay.gnss.signals import frequency_hz
 from replay.kernels import elementary, tracking
 from replay.kernels.atmosphere import KLOBUCHAR_REFERENCE_HZ
@@ -20,11 +20,14 @@ from replay.kernels.noise import gauss_markov
 from replay.kernels.observables import SIGHT_DTYPE, see
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, group_delay
 from replay.kernels.tracking import MEASUREMENT_DTYPE, SIGNAL_DTYPE
+from replay.kernels.true_orbit import broadcast_errors
 from replay.log.columns import Columns, Ragged, concatenate
-from replay.schemas import navigation_pb2
+from replay.simulate.air import ionosphere_message
 from replay.simulate.blockage import Surroundings, surroundings
-from replay.simulate.constellation import messages, name_of, sends
+from replay.simulate.constellation import name_of, sends
+from replay.simulate.navigation import preferred
 from replay.simulate.noise import Floats, normals, uniforms
+from replay.simulate.signal_truth import signal_truth
 from replay.simulate.sky import Receiver, Setup
 from replay.simulate.truth import Epochs, Scene, TrueSky, make_epochs, make_sky, wander
 
@@ -35,7 +38,6 @@ Ints = npt.NDArray[np.int64]
 
 _MILLISECOND: Final = 1e-3
 _HIDDEN_DELAY_M: Final = 1.0  # of signals whose delay no message tells; assumed
-_NODES_PER_TAU: Final = 10.0
 _HOUR_S: Final = 3600.0
 
 
@@ -50,8 +52,10 @@ def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, s
     """
     sky = make_sky(setup, scene)
     rows = {
-        channels.NAV.topic: messages(sky.broadcast, scene.start_ns, scene.start_ns + scene.end_ns),
-        channels.NAV_IONOSPHERE.topic: _ionosphere(setup, scene.start_ns),
+        channels.NAV.topic: sky.messages,
+        channels.NAV_IONOSPHERE.topic: ionosphere_message(
+            setup.sky.ionosphere, setup.sky.systems, scene.start_ns
+        ),
     }
     slips: list[dict[str, Any]] = []
     arcs: list[list[Any]] = []
@@ -64,6 +68,8 @@ def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, s
         rows[channels.RECEIVER.at(**at)] = _information(receiver, epochs, scene)
         rows[channels.RECEIVER_EPOCH.at(**at)] = part.epoch_rows(measured)
         rows[channels.GNSS_OBS.at(**at)] = measured
+        if part.terms is not None:
+            rows[channels.SIGNAL_TRUTH.at(**at)] = part.terms
         slips += part.slips
         arcs += part.arcs
         _check_slips(setup, receiver, epochs, part.slips, scene.start_ns)
@@ -108,6 +114,7 @@ class _Part:
         self.around = around
         self.slips: list[dict[str, Any]] = []
         self.arcs: list[list[Any]] = []
+        self.terms: Columns | None = None  # filled by `measure` where they are asked for
         spans = np.zeros(len(epochs.elapsed_ns), dtype=np.bool_)
         for begin_s, end_s in receiver.gaps:
             spans |= (epochs.elapsed_ns >= round(begin_s * time.NS_PER_S)) & (
@@ -127,15 +134,25 @@ class _Part:
             self.around, self.receiver.name, self.scene.seed, self.epochs.elapsed_ns,
             self.epochs.headings, sights,
         )  # fmt: skip
-        parts, order = [], []
+        parts, order, terms = [], [], []
         for index, name in enumerate(sorted(sights)):
-            number = next(n for n, r in enumerate(self.sky.satellites) if name_of(r) == name)
+            number = next(n for n, r in enumerate(self.sky.broadcast) if name_of(r) == name)
+            off = self._orbit_errors(name, sights[name]) if self.scene.signals else None
             for signal in sorted(self.receiver.signals):
-                if signal[0] == name[0] and sends(self.sky.satellites[number], signal[1:]):
-                    table = self._signal(number, signal, sights[name], around[name])
+                if signal[0] == name[0] and sends(self.sky.broadcast[number], signal[1:]):
+                    settings = self._settings(number, signal)
+                    table = self._signal(name, signal, settings, sights[name], around[name])
                     rows = np.flatnonzero(table["code"])
-                    parts.append(self._columns(name, signal[1:], table, rows))
+                    parts.append(self._columns(number, signal[1:], table, rows))
                     order.append(rows * len(sights) + index)
+                    if off is not None:
+                        kept = sights[name][rows], table[rows]
+                        terms.append(
+                            signal_truth(
+                                (name, signal[1:]), self._times(rows), kept,
+                                self.epochs.clock[rows, 0], off[rows], settings[0],
+                            )
+                        )  # fmt: skip
         if not parts:
             raise ConfigurationError(
                 "no satellite sends any of its signals", where=self.receiver.name,
@@ -143,7 +160,27 @@ class _Part:
             )  # fmt: skip
         # Parts come by satellite and signal: a stable sort by epoch and satellite keeps both.
         rows = np.argsort(np.concatenate(order), kind="stable")
+        if terms:
+            self.terms = _renumbered(concatenate(terms).take(rows))
         return _renumbered(concatenate(parts).take(rows))
+
+    def _times(self, rows: Ints) -> tuple[Ints, Ints]:
+        """Valid and log times of epochs, ns."""
+        valid = self.scene.start_ns + self.epochs.elapsed_ns[rows]
+        return valid, valid + round(self.receiver.latency * time.NS_PER_S)
+
+    def _orbit_errors(self, name: str, sights: Records) -> Floats:
+        """True less broadcast range and clock of a satellite at every epoch, m."""
+        own = self.sky.messages.take(self.sky.messages["satellite"] == name.encode())
+        known = ephemeris_records(own)
+        kept = preferred(known)
+        logged = own.log_time_ns[np.isin(known["source"], kept["source"])]
+        valid, log = self._times(np.arange(len(sights)))
+        out = np.empty(len(sights))
+        broadcast_errors(
+            kept, logged, valid, log, -self.epochs.clock[:, 0], self.epochs.positions, sights, out
+        )
+        return out
 
     def _sights(self) -> dict[str, Records]:
         """True sights of the satellites that are above the mask at some epoch."""
@@ -158,25 +195,25 @@ class _Part:
         sine = float(elementary.sin(self.receiver.mask))
         systems = {signal[0] for signal in self.receiver.signals}
         found = {}
-        for index, record in enumerate(sky.satellites):
+        for index, record in enumerate(sky.broadcast):
             name = name_of(record)
             if name[0] not in systems:
                 continue
             sights = np.zeros(len(times), dtype=SIGHT_DTYPE)
             see(
-                sky.satellites[index : index + 1], sky.atmosphere, sky.residuals[index], wet,
-                times, offsets, scene.start_ns, epochs.positions, epochs.velocities,
-                self.receiver.mask, sine, sights,
+                sky.satellites[index], sky.atmosphere, sky.residuals[index], wet,
+                sky.limits_s[index], times, offsets, scene.start_ns, epochs.positions,
+                epochs.velocities, self.receiver.mask, sine, sights,
             )  # fmt: skip
             if sights["seen"].any():
                 found[name] = sights
         return found
 
-    def _signal(self, number: int, signal: str, sights: Records, around: Surroundings) -> Records:
+    def _signal(
+        self, name: str, signal: str, settings: Records, sights: Records, around: Surroundings
+    ) -> Records:
         """Measurements of one signal of one satellite at every epoch."""
-        receiver, scene = self.receiver, self.scene
-        record = self.sky.satellites[number]
-        name, count = name_of(record), len(sights)
+        receiver, scene, count = self.receiver, self.scene, len(sights)
         source = f"{receiver.name}.{name}.{signal[1:]}"
         noise = normals(scene.seed, source, count, 6)
         self._correlate(noise)
@@ -192,8 +229,8 @@ class _Part:
         states = np.where(self.awake, around.states, tracking.BLOCKED)
         out = np.zeros(count, dtype=MEASUREMENT_DTYPE)
         tracking.track(
-            sights, states, around.losses, self.epochs.clock, self._settings(number, signal),
-            noise, draws, listed, self.epochs.interval_s, out,
+            sights, states, around.losses, self.epochs.clock, settings, noise, draws, listed,
+            self.epochs.interval_s, out,
         )  # fmt: skip
         self._remember(name, signal[1:], out)
         return out
@@ -215,11 +252,11 @@ class _Part:
 
     def _settings(self, number: int, signal: str) -> Records:
         """Numbers of one signal for the kernel."""
-        r, record = self.receiver, self.sky.satellites[number]
+        r, record = self.receiver, self.sky.broadcast[number]
         band = int(signal[1])
-        frequency = frequency_hz(signal[0], band)
+        frequency = frequency_hz(signal[0], band, int(record["frequency_channel"]))
         ratio = KLOBUCHAR_REFERENCE_HZ / frequency
-        told = float(group_delay(self.sky.broadcast[number], band))
+        told = float(group_delay(record, band))
         if math.isnan(told):
             source = f"delay.{name_of(record)}.{band}"
             hidden = float(normals(self.scene.seed, source, 1, 1)[0, 0])
@@ -277,30 +314,30 @@ class _Part:
                  int(table["ambiguity"][first])]
             )  # fmt: skip
 
-    def _columns(self, name: str, signal: str, table: Records, rows: Ints) -> Columns:
+    def _columns(self, number: int, signal: str, table: Records, rows: Ints) -> Columns:
         """Rows of one signal."""
-        kept = table[rows]
+        kept, record = table[rows], self.sky.broadcast[number]
         carrier = kept["carrier"] != 0
-        valid = self.scene.start_ns + self.epochs.elapsed_ns[rows]
-        latency = round(self.receiver.latency * time.NS_PER_S)
-        return Columns.build(
-            valid,
-            {
-                "satellite": np.full(len(rows), name, dtype="S3"),
-                "signal": np.full(len(rows), signal, dtype="S2"),
-                "pseudorange_m": kept["pseudorange_m"].copy(),
-                "carrier_phase_cycles": np.where(carrier, kept["carrier_cycles"], np.nan),
-                "doppler_hz": np.where(carrier, kept["doppler_hz"], np.nan),
-                "cn0_dbhz": kept["cn0_dbhz"].copy(),
-                "loss_of_lock": kept["flag"].astype(np.uint32),
-                "lock_time_s": np.where(carrier, kept["lock_s"], np.nan),
-            },
-            log_time_ns=valid + latency,
-            present={
-                field: carrier
-                for field in ("carrier_phase_cycles", "doppler_hz", "loss_of_lock", "lock_time_s")
-            },
-        )
+        valid, log = self._times(rows)
+        values = {
+            "satellite": np.full(len(rows), name_of(record), dtype="S3"),
+            "signal": np.full(len(rows), signal, dtype="S2"),
+            "pseudorange_m": kept["pseudorange_m"].copy(),
+            "carrier_phase_cycles": np.where(carrier, kept["carrier_cycles"], np.nan),
+            "doppler_hz": np.where(carrier, kept["doppler_hz"], np.nan),
+            "cn0_dbhz": kept["cn0_dbhz"].copy(),
+            "loss_of_lock": kept["flag"].astype(np.uint32),
+            "lock_time_s": np.where(carrier, kept["lock_s"], np.nan),
+        }
+        present = {
+            field: carrier
+            for field in ("carrier_phase_cycles", "doppler_hz", "loss_of_lock", "lock_time_s")
+        }
+        if any(name[0] == "R" for name in self.receiver.signals):
+            channel = int(record["frequency_channel"])
+            values["glonass_channel"] = np.full(len(rows), channel, dtype=np.int32)
+            present["glonass_channel"] = np.full(len(rows), name_of(record)[0] == "R")
+        return Columns.build(valid, values, log_time_ns=log, present=present)
 
     def epoch_rows(self, measured: Columns) -> Columns:
         """One row per epoch that is not in a gap; satellites are counted once."""
@@ -345,25 +382,5 @@ def _information(receiver: Receiver, epochs: Epochs, scene: Scene) -> Columns:
             "antenna_offset_enu_m": np.zeros((1, 3)),
             "interval_s": np.array([epochs.interval_s]),
             "header": Ragged.from_blobs([b""]),
-        },
-    )
-
-
-def _ionosphere(setup: Setup, start_ns: int) -> Columns:
-    """Broadcast coefficients: the same numbers for each system that has such a model."""
-    models: Mapping[str, int] = {
-        "G": navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR,
-        "J": navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR,
-        "C": navigation_pb2.IONOSPHERE_MODEL_BEIDOU,
-    }
-    systems = sorted(set(setup.sky.systems) & set(models)) or ["G"]
-    numbers = np.array([*setup.sky.ionosphere.alpha, *setup.sky.ionosphere.beta])
-    count = len(systems)
-    return Columns.build(
-        np.full(count, start_ns),
-        {
-            "system": np.array(systems, dtype="S1"),
-            "model": np.array([models[system] for system in systems], dtype=np.int32),
-            "coefficients": Ragged.from_matrix(np.tile(numbers, (count, 1))),
         },
     )

@@ -1,7 +1,7 @@
 """What a simulated vehicle does, one manoeuvre after the other.
 
 In a scenario each is a table of `[[segments]]` with its `kind`. Manoeuvres change
-speed, heading or grade from whatever they are, so that a list can be repeated.
+speed, course, grade or attitude from whatever they are, so that a list can be repeated.
 """
 
 from __future__ import annotations
@@ -36,13 +36,23 @@ class Speed(Section, frozen=True):
     ramp: Annotated[float, quantity("s", "in which the acceleration builds up")] = 1.0
 
 
+class Stop(Section, frozen=True):
+    """Brake to rest and stand."""
+
+    kind: str
+    duration: Annotated[float, quantity("s", "of standing; 0 goes on at once")] = 0.0
+    acceleration: Annotated[float, quantity("m/s^2", "largest")] = 1.5
+    ramp: Annotated[float, quantity("s", "in which the acceleration builds up")] = 1.0
+
+
 class Turn(Section, frozen=True):
-    """Turn by an angle, on a radius or in a time."""
+    """Turn by an angle: on a radius, in a time, or as a banked aircraft does."""
 
     kind: str
     angle: Annotated[float, quantity("rad", "to the right; negative is to the left")]
-    radius: Annotated[float, quantity("m", "of the tightest part; 0: see duration")] = 0.0
-    duration: Annotated[float, quantity("s", "of the turn; 0: see radius")] = 0.0
+    radius: Annotated[float, quantity("m", "of the tightest part; 0: see the others")] = 0.0
+    duration: Annotated[float, quantity("s", "of the turn; 0: see the others")] = 0.0
+    bank: Annotated[float, quantity("rad", "whose coordinated turn it is; 0: see the others")] = 0.0
     ramp: Annotated[float, quantity("s", "in which the turn rate builds up")] = 1.0
 
 
@@ -54,6 +64,26 @@ class Slope(Section, frozen=True):
     duration: Annotated[float, quantity("s", "of the change")]
 
 
+class Climb(Section, frozen=True):
+    """Climb or descend from level flight to level flight, at the same speed along the path."""
+
+    kind: str
+    height: Annotated[float, quantity("m", "gained; negative is a descent")]
+    angle: Annotated[float, quantity("rad", "of the path, more than 0; 0: see rate")] = 0.0
+    rate: Annotated[float, quantity("m/s", "of height, more than 0; 0: see angle")] = 0.0
+    ramp: Annotated[float, quantity("s", "in which the path bends, at either end")] = 5.0
+
+
+class Attitude(Section, frozen=True):
+    """Turn the body to angles relative to its path, which stay; the path goes on as before."""
+
+    kind: str
+    duration: Annotated[float, quantity("s", "of the change")]
+    roll: Annotated[float, quantity("rad", "at the end, right side down")] = 0.0
+    pitch: Annotated[float, quantity("rad", "at the end, nose up")] = 0.0
+    yaw: Annotated[float, quantity("rad", "at the end, to the right of the course")] = 0.0
+
+
 class LaneChange(Section, frozen=True):
     """Move sideways and drive on in the direction of before."""
 
@@ -62,11 +92,21 @@ class LaneChange(Section, frozen=True):
     duration: Annotated[float, quantity("s", "of the change")]
 
 
-Segment = Hold | Straight | Speed | Turn | Slope | LaneChange
+Segment = Hold | Straight | Speed | Stop | Turn | Slope | Climb | Attitude | LaneChange
 
 KINDS: Final[dict[str, type[Segment]]] = dict(
     zip(
-        ("hold", "straight", "speed", "turn", "slope", "lane_change"),
+        (
+            "hold",
+            "straight",
+            "speed",
+            "stop",
+            "turn",
+            "slope",
+            "climb",
+            "attitude",
+            "lane_change",
+        ),
         get_args(Segment),
         strict=True,
     )

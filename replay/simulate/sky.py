@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
 from replay.configuration import Section, Table, build, literal, quantity
 from replay.errors import ConfigurationError
 from replay.gnss.signals import frequency_hz
+from replay.simulate.air import SIGNED, Ionosphere, Troposphere
 from replay.simulate.constellation import SYSTEMS
 
 KINDS: Final = ("vehicle", "static")
@@ -28,33 +30,12 @@ class Ephemerides(Section, frozen=True):
     clock_tau: Annotated[float, quantity("s", "in which its drift makes as much")] = 7200.0
 
 
-class Ionosphere(Section, frozen=True):
-    """The true ionosphere: Klobuchar's with the broadcast coefficients, and what is beyond."""
-
-    enabled: bool = True
-    # The example of many textbooks: a quiet ionosphere in middle latitudes.
-    alpha: tuple[float, ...] = (1.1176e-8, 1.4901e-8, -5.9605e-8, -1.1921e-7)
-    beta: tuple[float, ...] = (1.1674e5, 1.4746e5, -1.3107e5, -3.9322e5)
-    scale: Annotated[float, quantity("1", "true over broadcast delay")] = 1.0
-    residual: Annotated[float, quantity("m", "vertical, L1, each satellite's own")] = 0.0
-    gradient: Annotated[float, quantity("1", "m per m, each satellite's own; ppm")] = 0.0
-    tau: Annotated[float, quantity("s", "correlation time of both")] = 1800.0
-
-
-class Troposphere(Section, frozen=True):
-    """The true troposphere: Saastamoinen's zenith delay, Niell's mapping, and a wet remainder."""
-
-    enabled: bool = True
-    humidity: Annotated[float, quantity("1", "of the standard atmosphere")] = 0.7
-    wet: Annotated[float, quantity("m", "zenith wet delay beyond, common to all")] = 0.0
-    local_wet: Annotated[float, quantity("m", "beyond that, each receiver's own")] = 0.0
-    tau: Annotated[float, quantity("s", "correlation time of both")] = 7200.0
-
-
 class Sky(Section, frozen=True):
     """What all receivers share."""
 
     systems: str = "GEC"
+    # A log with /gnss/nav, from the scenario's folder; none is the built-in constellation.
+    navigation: str = ""
     shapiro: bool = False
     errors: Ephemerides = Ephemerides()
     ionosphere: Ionosphere = Ionosphere()
@@ -171,12 +152,15 @@ class Setup:
     receivers : tuple of Receiver
     blockages : tuple of Blockage
     slips : tuple of Slip
+    folder : Path
+        Of the scenario: names of files are from there.
     """
 
     sky: Sky = dataclasses.field(default_factory=Sky)
     receivers: tuple[Receiver, ...] = ()
     blockages: tuple[Blockage, ...] = ()
     slips: tuple[Slip, ...] = ()
+    folder: Path = dataclasses.field(default=Path(), compare=False)
 
     def to_toml(self) -> str:
         """Canonical TOML; empty without receivers."""
@@ -211,8 +195,14 @@ def _lines(head: str, path: str, section: Section) -> Iterator[str]:
 SectionT = TypeVar("SectionT", bound=Section)
 
 
-def take_setup(table: Table) -> Setup:
+def take_setup(table: Table, folder: Path = Path()) -> Setup:
     """Take the sections of observations out of a scenario's table.
+
+    Parameters
+    ----------
+    table : dict
+    folder : Path
+        What names of files are relative to.
 
     Raises
     ------
@@ -239,7 +229,7 @@ def take_setup(table: Table) -> Setup:
         _check_blockage(blockage, f"blockage[{index}]", names)
     for index, slip in enumerate(slips):
         _known(slip.receiver, names, f"slips[{index}]")
-    return Setup(sky, receivers, blockages, slips)
+    return Setup(sky, receivers, blockages, slips, folder)
 
 
 def _read(cls: type[SectionT], table: Any, where: str) -> SectionT:
@@ -280,15 +270,17 @@ def _refuse(faults: tuple[tuple[bool, str, str], ...], where: str) -> None:
 
 
 def _check_sky(sky: Sky) -> None:
-    _check(sky, "sky")
+    _check(sky, "sky", SIGNED)
     unknown = [system for system in sky.systems if system not in SYSTEMS]
     times = (sky.errors.clock_tau, sky.ionosphere.tau, sky.troposphere.tau)
+    air, field = sky.ionosphere, sky.troposphere.field
+    told = (air.broadcast_alpha, air.broadcast_beta)
     _refuse(
         (
             (
                 bool(unknown),
                 f"systems has {''.join(unknown)!r}",
-                f"letters of {SYSTEMS}; GLONASS is not simulated",
+                f"letters of {SYSTEMS}",
             ),
             (len(set(sky.systems)) != len(sky.systems), "systems names one twice", "name it once"),
             (min(times) == 0.0, "a correlation time is 0", "write more than 0"),
@@ -296,6 +288,16 @@ def _check_sky(sky: Sky) -> None:
                 len(sky.ionosphere.alpha) != 4 or len(sky.ionosphere.beta) != 4,
                 "ionosphere.alpha and beta have four numbers each",
                 "write the eight of the message",
+            ),
+            (
+                any(len(numbers) not in (0, 4) for numbers in told),
+                "ionosphere.broadcast_alpha and broadcast_beta have four numbers each, or none",
+                "write the eight of the message",
+            ),
+            (
+                min(air.wave.length, air.front.width, field.length) == 0.0,
+                "a wave, a front or a field has no length",
+                "write more than 0 m",
             ),
         ),
         "sky",
@@ -351,6 +353,7 @@ def _check_receiver(receiver: Receiver, where: str, sky: Sky) -> None:
             frequency_hz(signal[:1], int(signal[1])) if good else None
         except KeyError:
             good = False
+        good = good and (signal[0] != "R" or signal[1] in "12")  # no satellite sends CDMA here
         if not good:
             raise ConfigurationError(
                 f"no signal {signal!r}", where=where,

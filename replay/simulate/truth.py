@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +12,18 @@ import numpy.typing as npt
 from replay import time
 from replay.errors import ConfigurationError
 from replay.kernels import elementary
-from replay.kernels.earth import enu_axes
+from replay.kernels.ephemeris import EPHEMERIS_DTYPE
 from replay.kernels.noise import gauss_markov
-from replay.kernels.observables import ATMOSPHERE_DTYPE, walk_clock
+from replay.kernels.observables import walk_clock
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.trajectory import antenna_fixes
-from replay.simulate.constellation import constellation, name_of, perturb, refer
+from replay.log.columns import Columns
+from replay.simulate import glonass
+from replay.simulate.air import NODES_PER_TAU, air_record
+from replay.simulate.constellation import constellation, messages, name_of, perturb, refer
+from replay.simulate.navigation import LIMITS_S, read_sky
 from replay.simulate.noise import Floats, normals
-from replay.simulate.sky import Receiver, Setup
+from replay.simulate.sky import Ephemerides, Receiver, Setup
 from replay.simulate.trajectory import Trajectory, ecef_of
 
 Records = npt.NDArray[np.void]
@@ -26,7 +31,6 @@ Ints = npt.NDArray[np.int64]
 
 _MILLISECOND: Final = 1e-3
 _PER_KM: Final = 1e3
-_NODES_PER_TAU: Final = 10.0
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,8 @@ class Scene:
     start_ns, end_ns : int, ns
         Of the log, GPS, and how long it is.
     seed : int
+    signals : bool
+        Whether the terms of each measurement are written.
     """
 
     trajectory: Trajectory
@@ -48,6 +54,7 @@ class Scene:
     start_ns: int
     end_ns: int
     seed: int
+    signals: bool = False
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -56,8 +63,14 @@ class TrueSky:
 
     Attributes
     ----------
-    satellites, broadcast : arrays (n,) of EPHEMERIS_DTYPE
-        Their true orbits and clocks, and what they say of them.
+    satellites : list of arrays (m,) of EPHEMERIS_DTYPE
+        True orbit and clock of each, as :mod:`replay.kernels.true_orbit` takes them.
+    limits_s : list of float, s
+        How far from their reference times those hold.
+    broadcast : array (n,) of EPHEMERIS_DTYPE
+        A message of each.
+    messages : Columns
+        All that are broadcast, rows of `replay.BroadcastEphemeris`.
     atmosphere : array (1,) of ATMOSPHERE_DTYPE
     residuals : list of float64 arrays (3, m)
         Of each satellite, as :func:`replay.kernels.observables.delays` takes them.
@@ -65,8 +78,10 @@ class TrueSky:
         Zenith wet delay at nodes.
     """
 
-    satellites: Records
+    satellites: list[Records]
+    limits_s: list[float]
     broadcast: Records
+    messages: Columns
     atmosphere: Records
     residuals: list[Floats]
     common_wet: Floats
@@ -98,38 +113,62 @@ class Epochs:
 def make_sky(setup: Setup, scene: Scene) -> TrueSky:
     """Broadcast and true orbits, and nodes of what wanders."""
     sky, seed = setup.sky, scene.seed
-    broadcast = constellation(sky.systems, seed, scene.start_ns)
-    true = broadcast.copy()
-    for index, record in enumerate(broadcast):
-        # Near the log, so that differences of rates have not grown since the week's start.
-        near = refer(record, scene.start_ns // time.NS_PER_S * time.NS_PER_S)
-        draw = normals(seed, f"ephemeris.{name_of(record)}", 1, 6)[0]
-        errors = sky.errors
-        true[index] = perturb(near, errors.orbit, errors.clock, errors.clock_tau, draw)
-    air = np.zeros(1, dtype=ATMOSPHERE_DTYPE)
+    end_ns = scene.start_ns + scene.end_ns
+    if sky.navigation:
+        real = read_sky(setup.folder / sky.navigation, sky.systems, scene.start_ns, end_ns)
+        orbits, sent = real.satellites, real.messages
+        broadcast = np.concatenate([records[:1] for records in orbits])
+        limits = [LIMITS_S[name_of(record)[0]] for record in broadcast]
+    else:
+        broadcast = constellation(sky.systems, seed, scene.start_ns)
+        orbits = [_made_orbit(record, scene.start_ns, end_ns) for record in broadcast]
+        sent = messages(broadcast, scene.start_ns, end_ns)
+        limits = [math.inf] * len(orbits)
+    true = [_off(records, sky.errors, seed, scene.start_ns) for records in orbits]
     iono, tropo = sky.ionosphere, sky.troposphere
-    air["ionosphere"], air["troposphere"] = iono.enabled, tropo.enabled
-    air["shapiro"], air["alpha"], air["beta"] = sky.shapiro, iono.alpha, iono.beta
-    air["scale"], air["humidity"] = iono.scale, tropo.humidity
-    air["ionosphere_spacing"] = iono.tau / _NODES_PER_TAU
-    air["wet_spacing"] = tropo.tau / _NODES_PER_TAU
-    air["origin"] = scene.origin
-    x, y, z = scene.origin.tolist()
-    enu_axes(x, y, z, air["axes"][0])
+    air = air_record(iono, tropo, sky.shapiro, scene.origin, seed)
     span_s = scene.end_ns / time.NS_PER_S
     residuals = []
-    for record in true:
+    for record in broadcast:
         series = wander(seed, f"ionosphere.{name_of(record)}", iono.tau, span_s, 3)
         series[0] *= iono.residual
         series[1:] *= iono.gradient * _PER_KM
         residuals.append(series)
     wet = tropo.wet * wander(seed, "troposphere.wet", tropo.tau, span_s, 1)[0]
-    return TrueSky(true, broadcast, air, residuals, wet)
+    return TrueSky(true, limits, broadcast, sent, air, residuals, wet)
+
+
+def _made_orbit(record: Any, start_ns: int, end_ns: int) -> Records:
+    """Records of a satellite of the built-in constellation over a span."""
+    if name_of(record)[0] == "R":
+        times = glonass.reference_times(record, start_ns, end_ns)
+    else:
+        # Near the log, so that differences of rates have not grown since the week's start.
+        times = [start_ns // time.NS_PER_S * time.NS_PER_S]
+    return np.array([refer(record, toe_ns) for toe_ns in times], dtype=EPHEMERIS_DTYPE)
+
+
+def _off(records: Records, errors: Ephemerides, seed: int, start_ns: int) -> Records:
+    """The same satellite where it truly is."""
+    draw = normals(seed, f"ephemeris.{name_of(records[0])}", 1, 6)[0]
+    since = (records["toc_ns"] - start_ns // time.NS_PER_S * time.NS_PER_S) / time.NS_PER_S
+    drift = errors.clock / errors.clock_tau * draw[5]
+    if name_of(records[0])[0] == "R":
+        offset = errors.clock * draw[4] + drift * since
+        true = glonass.perturb(records, errors.orbit, offset, draw[:4])
+        true["af1"] += drift / SPEED_OF_LIGHT_M_S
+        return true
+    true = np.array(
+        [perturb(one, errors.orbit, errors.clock, errors.clock_tau, draw) for one in records],
+        dtype=EPHEMERIS_DTYPE,
+    )
+    true["af0"] += drift * since / SPEED_OF_LIGHT_M_S
+    return true
 
 
 def wander(seed: int, source: str, tau_s: float, span_s: float, count: int) -> Floats:
     """Gauss-Markov sequences (count, n) of unit variance at nodes, for cubics between them."""
-    spacing = tau_s / _NODES_PER_TAU
+    spacing = tau_s / NODES_PER_TAU
     rows = math.ceil(span_s / spacing) + 5  # one to spare at either end
     series = normals(seed, source, rows, count)
     decay = float(elementary.exp(-spacing / tau_s))

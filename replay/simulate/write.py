@@ -11,18 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from replay import channels, time
-from replay.configuration import STANDARD_GRAVITY_M_S2
 from replay.engine.manifest import DEFAULTS, MANIFEST, make_manifest, manifest_metadata
-from replay.errors import ConfigurationError
 from replay.log.columns import Columns
 from replay.log.digest import ChannelDigest
 from replay.log.writer import LogWriter
 from replay.schemas import gnss_pb2
 from replay.simulate import gnss, imu
 from replay.simulate.defaults import defaults_toml
+from replay.simulate.motion import Moved, move
 from replay.simulate.observations import SIMULATED, observe
-from replay.simulate.scenario import Scenario, Settings, load_scenario
-from replay.simulate.trajectory import Trajectory, ecef_of, plan
+from replay.simulate.scenario import Scenario, load_scenario
+from replay.simulate.settings import Settings
+from replay.simulate.trajectory import Trajectory
 from replay.simulate.truth import Scene
 
 Times = npt.NDArray[np.int64]
@@ -74,7 +74,8 @@ def simulate(
 
 def write_log(scenario: Scenario, out: Path) -> SimulationResult:
     """Write the log of a scenario that was read."""
-    rows, told = make_all(scenario)
+    moved = move(scenario)
+    rows, told = make_all(scenario, moved)
     toml = scenario.to_toml()
     with LogWriter(out) as writer:
         for topic in rows:
@@ -90,12 +91,12 @@ def write_log(scenario: Scenario, out: Path) -> SimulationResult:
             command="simulate",
             configuration=toml,
             outputs=digests,
-            notes=[f"scenario {scenario.settings.name}"],
+            inputs=moved.inputs,
+            notes=[f"scenario {scenario.settings.name}", *moved.notes],
         )
         writer.add_metadata(MANIFEST, manifest_metadata(manifest))
-    first = time.parse_calendar(scenario.settings.start.time)
     last = int(rows[channels.IMU.topic].valid_time_ns[-1])
-    return SimulationResult(out, (last - first) / time.NS_PER_S, digests)
+    return SimulationResult(out, (last - moved.start_ns) / time.NS_PER_S, digests)
 
 
 def _message(topic: str) -> str:
@@ -110,7 +111,9 @@ def make_channels(scenario: Scenario) -> dict[str, Columns]:
     return make_all(scenario)[0]
 
 
-def make_all(scenario: Scenario) -> tuple[dict[str, Columns], dict[str, str]]:
+def make_all(
+    scenario: Scenario, moved: Moved | None = None
+) -> tuple[dict[str, Columns], dict[str, str]]:
     """Rows of every channel of a scenario, by topic, and what observations hide.
 
     The second is the metadata record `replay.simulated`: JSON texts of cycle slips and
@@ -122,19 +125,9 @@ def make_all(scenario: Scenario) -> tuple[dict[str, Columns], dict[str, str]]:
         Where a manoeuvre cannot be driven, or the drive is too short for a sample.
     """
     settings = scenario.settings
-    pieces, duration_s = plan(scenario.segments, settings.start.heading, settings.repeat)
-    start_ns = time.parse_calendar(settings.start.time)
-    # Periods are whole nanoseconds, so that times are exact however long the log is.
-    period_ns = round(time.NS_PER_S / settings.imu.rate)
-    span_ns = int(duration_s * time.NS_PER_S)
-    samples = span_ns // period_ns
-    if samples < 1:
-        raise ConfigurationError("the drive is shorter than one sample", mend="add segments")
-    interval_s = period_ns / time.NS_PER_S
-    lean = np.array([settings.vehicle.roll_per_g, settings.vehicle.pitch_per_g])
-    lean /= STANDARD_GRAVITY_M_S2
-    origin = ecef_of(settings.start.latitude, settings.start.longitude, settings.start.height)
-    trajectory = Trajectory.drive(pieces, lean, origin, interval_s, samples)
+    moved = moved or move(scenario)
+    trajectory, start_ns, period_ns = moved.trajectory, moved.start_ns, moved.period_ns
+    samples, interval_s, origin = len(trajectory.rates), trajectory.interval_s, moved.origin
     data = imu.measure(
         trajectory.rates,
         trajectory.forces,
@@ -156,7 +149,8 @@ def make_all(scenario: Scenario) -> tuple[dict[str, Columns], dict[str, str]]:
         rows[channels.GNSS_FIX.at(receiver=settings.gnss.receiver)] = fixes
     told: dict[str, str] = {}
     if scenario.setup.receivers:
-        scene = Scene(trajectory, origin, start_ns, end_ns, settings.seed)
+        signals = settings.truth.signals
+        scene = Scene(trajectory, origin, start_ns, end_ns, settings.seed, signals)
         observed, told = observe(scenario.setup, scene)
         rows.update(observed)
     rows[channels.TRUTH.topic] = _truth(settings, trajectory, data, start_ns, end_ns)

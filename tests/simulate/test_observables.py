@@ -8,6 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from replay import channels
 from replay.errors import ConfigurationError
+from replay.kernels.observables import SIGHT_DTYPE, see
+from replay.simulate.air import Ionosphere, Troposphere, air_record
+from replay.simulate.constellation import constellation, refer
+from replay.simulate.trajectory import ecef_of
 from tests.simulate.observing import (
     DRIVE,
     FREQUENCY,
@@ -236,12 +240,13 @@ def test_rows_stand_by_time_satellite_and_signal():
     [
         ({"receivers": [base(signals=["R1C"])]}, "R1C"),
         ({"receivers": [base(signals=["G9C"])]}, "G9C"),
+        ({"receivers": [base(signals=["R3I"])], "sky": {"systems": "R"}}, "R3I"),
         ({"receivers": [receiver(kind="ship")]}, "ship"),
         ({"receivers": [receiver(kind="static")]}, "position"),
         ({"receivers": [receiver(), receiver()]}, "two"),
         ({"receivers": [receiver(noise={"code": -1.0})]}, "noise.code"),
         ({"receivers": [receiver(nois={})]}, "nois"),
-        ({"receivers": [receiver()], "sky": {"systems": "GR"}}, "R"),
+        ({"receivers": [receiver()], "sky": {"systems": "GS"}}, "S"),
         ({"receivers": [receiver()], "blockage": [{"kind": "fog", "begin": 0, "end": 1}]}, "fog"),
         (
             {"receivers": [receiver()], "blockage": [{"kind": "roof", "begin": 2, "end": 1}]},
@@ -263,3 +268,36 @@ def test_what_is_off_is_named(keys, what):
     with pytest.raises(ConfigurationError) as caught:
         make(*receivers, **keys)
     assert what in str(caught.value.what) + str(caught.value.mend)
+
+
+def test_no_satellite_that_rises_is_overlooked():
+    """Epochs that are passed over, because nothing can rise so fast, are truly below the mask."""
+    start = np.array(ecef_of(0.53, 1.99, 25.0))
+    seconds = np.arange(0.0, 4 * 3600.0, 20.0)
+    speed = np.array([-150.0, 80.0, 200.0])
+    places = start + seconds[:, None] * speed * np.cos(seconds / 3000.0)[:, None]
+    velocities = np.gradient(places, seconds, axis=0)
+    air = air_record(Ionosphere(enabled=False), Troposphere(enabled=False), False, start, 1)
+    nodes = np.zeros((3, 100))
+    times = START_NS + (seconds * 1e9).astype(np.int64)
+    offsets = np.zeros(len(times))
+    mask = np.radians(12.0)
+    rises = 0
+    for system in "GRECJ":
+        for record in constellation(system, 5, START_NS)[::2]:
+            orbit = np.array([refer(record, START_NS)])
+            whole, single = (np.zeros(len(times), dtype=SIGHT_DTYPE) for _ in range(2))
+            arguments = (orbit, air, nodes, nodes[0], np.inf)
+
+            def look(rows, out, arguments=arguments):
+                see(
+                    *arguments, times[rows], offsets[rows], START_NS, places[rows],
+                    velocities[rows], mask, np.sin(mask), out[rows],
+                )  # fmt: skip
+
+            look(slice(None), whole)
+            for row in range(len(times)):
+                look(slice(row, row + 1), single)
+            np.testing.assert_array_equal(whole["seen"], single["seen"])
+            rises += np.count_nonzero(np.diff(whole["seen"]) > 0)
+    assert rises > 10

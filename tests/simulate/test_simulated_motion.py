@@ -14,8 +14,9 @@ from replay.errors import ConfigurationError
 from replay.kernels.earth import EARTH_RATE_RAD_S, gravity
 from replay.kernels.rotation import matrix_from_quaternion, quaternion_from_matrix
 from replay.kernels.strapdown import NAVIGATION_DTYPE, mechanize
+from replay.simulate.planning import plan
 from replay.simulate.segments import read_segments
-from replay.simulate.trajectory import Trajectory, ecef_of, plan
+from replay.simulate.trajectory import Trajectory, ecef_of, make_body
 
 DEG = math.pi / 180.0
 ARCSECOND = DEG / 3600.0
@@ -34,6 +35,7 @@ TOWN = [
     {"kind": "speed", "to": 0.0, "acceleration": 2.5},
 ]
 LEAN = np.array([5.0, 2.0]) * DEG / 9.80665
+BODY = make_body(roll_per_lateral=LEAN[0], pitch_per_forward=LEAN[1])
 
 
 def drive(
@@ -41,7 +43,7 @@ def drive(
 ) -> tuple[Trajectory, float]:
     pieces, duration = plan(read_segments(segments), heading, repeat)
     start = ecef_of(52.0 * DEG, 4.4 * DEG, 44.0)
-    return Trajectory.drive(pieces, LEAN, start, 1.0 / rate, int(duration * rate)), duration
+    return Trajectory.drive(pieces, BODY, start, 1.0 / rate, int(duration * rate)), duration
 
 
 @njit
