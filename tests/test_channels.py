@@ -15,7 +15,13 @@ from replay.log import codec, schema
 from replay.stages.base import Port
 from replay.stages.gnss_ins_lc import GnssInsLoose
 
-NAMES = {"receiver": "r1", "rover": "rover", "run": "gnss-ins-lc", "network": "n1", "baseline": "b1"}
+NAMES = {
+    "receiver": "r1",
+    "rover": "rover",
+    "run": "gnss-ins-lc",
+    "network": "n1",
+    "baseline": "b1",
+}
 PARAMETERS = pytest.mark.parametrize("spec", CHANNELS, ids=[spec.name for spec in CHANNELS])
 
 

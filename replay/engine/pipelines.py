@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
 from replay.configuration import Section
 from replay.errors import UsageError
 from replay.stages.base import Stage
 
-Parts = tuple[type[Section], tuple[Stage[Any], ...]]
-"""Settings that all stages are started with, and the stages, every input before its reader."""
+Stages = tuple[Stage[Any], ...]
+Parts = tuple[type[Section], Stages | Callable[[Any, Collection[str]], Stages]]
+"""Settings that all stages are started with, and the stages, every input before its reader.
+
+Where the log decides which stages there are, a function of the settings and its topics.
+"""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -37,9 +41,10 @@ class Pipeline:
         """Settings; their `name` names the run."""
         return self.parts()[0]
 
-    def stages(self) -> tuple[Stage[Any], ...]:
-        """The stages, in an order in which every input stands before its reader."""
-        return self.parts()[1]
+    def stages(self, config: Section, topics: Collection[str]) -> Stages:
+        """The stages over a log, in an order in which every input stands before its reader."""
+        found = self.parts()[1]
+        return found(config, topics) if callable(found) else found
 
 
 def _gnss_ins_lc() -> Parts:
@@ -114,6 +119,38 @@ def _moving_base() -> Parts:
     return MovingBaseConfig, (Satellites(), MovingBaseSatellites(), Rtk())
 
 
+def _network() -> Parts:
+    from replay.stages.network import find_layout, station_stages
+    from replay.stages.network_config import NetworkConfig
+
+    def stages(config: NetworkConfig, topics: Collection[str]) -> Stages:
+        return tuple(station_stages(config, find_layout(config, topics)))
+
+    return NetworkConfig, stages
+
+
+def _network_rtk() -> Parts:
+    from replay.stages.network import network_stages
+    from replay.stages.network_config import NetworkRtkConfig
+    from replay.stages.rtk import Rtk
+
+    def stages(config: NetworkRtkConfig, topics: Collection[str]) -> Stages:
+        return (*network_stages(config, topics), Rtk(corrected=config.mode == "network"))
+
+    return NetworkRtkConfig, stages
+
+
+def _network_ins_tc() -> Parts:
+    from replay.stages.network import network_stages
+    from replay.stages.network_config import NetworkInsConfig
+    from replay.stages.rtk_ins_tc import RtkInertial
+
+    def stages(config: NetworkInsConfig, topics: Collection[str]) -> Stages:
+        return (*network_stages(config, topics), RtkInertial(corrected=config.mode == "network"))
+
+    return NetworkInsConfig, stages
+
+
 _ALL: Final = (
     Pipeline(
         "gnss-ins-lc",
@@ -154,6 +191,21 @@ _ALL: Final = (
         "rtk-ins-tc",
         "tightly coupled RTK/INS: differences to a base, integers, inertial samples",
         _rtk_ins_tc,
+    ),
+    Pipeline(
+        "network",
+        "reference stations: integers and errors of their baselines",
+        _network,
+    ),
+    Pipeline(
+        "network-rtk",
+        "relative positioning with corrections from a network of reference stations",
+        _network_rtk,
+    ),
+    Pipeline(
+        "network-ins-tc",
+        "tightly coupled RTK/INS with corrections from a network of reference stations",
+        _network_ins_tc,
     ),
     Pipeline(
         "moving-base",

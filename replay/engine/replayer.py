@@ -69,7 +69,6 @@ class Replayer:
         require_ieee_arithmetic()
         self.reader = reader
         self.job = job
-        stages = find_pipeline(job.pipeline).stages()
         self.recorded = {
             topic: info
             for topic, info in reader.channels.items()
@@ -78,6 +77,7 @@ class Replayer:
         section = getattr(job.config, "gnss", None)
         receivers = {role: str(getattr(section, role, "")) for role in (RECEIVER, BASE)}
         name = str(getattr(job.config, "name", job.pipeline))
+        stages = find_pipeline(job.pipeline).stages(job.config, list(self.recorded))
         self.nodes = bind(stages, self._depths(), run=name, receivers=receivers)
         self.traces = [StageTrace(node) for node in self.nodes]
         self.states = [self._start(node) for node in self.nodes]

@@ -34,8 +34,8 @@ _UNTESTABLE = 0.01
 
 @njit(cache=True)
 def pair_rows(
-    rover: Array, base: Array, gap: float, cfg: Record, x: Array, base_x: Array, up: Array,
-    pairs: Array, u: Array,
+    rover: Array, base: Array, gap: float, cfg: Record, x: Array, coarse: Array, base_x: Array,
+    up: Array, pairs: Array, u: Array,
 ) -> int:  # fmt: skip
     """Satellites that both receivers see, and what is computed of each.
 
@@ -46,7 +46,8 @@ def pair_rows(
     gap : float, s
         Rover's epoch less the base's.
     cfg : record of RTK_CONFIG_DTYPE
-    x, base_x : float64 arrays (3,), m, ECEF
+    x, coarse, base_x : float64 arrays (3,), m, ECEF
+        The rover, where its delays were computed, and the base.
     up : float64 array (3,)
         Of the rover's horizon, ECEF.
     pairs : array of PAIR_DTYPE
@@ -61,6 +62,9 @@ def pair_rows(
     """
     count = 0
     j = 0
+    higher = 0.0
+    for c in range(3):
+        higher += up[c] * (x[c] - coarse[c])
     for i in range(rover.shape[0]):
         satellite = rover[i]["satellite"]
         while j < base.shape[0] and base[j]["satellite"] < satellite:
@@ -88,6 +92,8 @@ def pair_rows(
         far = geometric_range(base[j], base_x, u) + _delays(base[j])
         pair["computed"] = geometric_range(rover[i], x, u) + _delays(rover[i]) - far
         fall = _HYDROSTATIC_FALL * rover[i]["hydrostatic"] + _WET_FALL * rover[i]["wet"]
+        # Codes alone put the rover some metres, without an ionosphere some tens, off its height.
+        pair["computed"] -= fall * higher
         for c in range(3):
             pair["u"][c] = -u[c] - fall * up[c]
     return count
@@ -118,7 +124,10 @@ def difference(rover: Record, base: Record, slot: int, phase: bool) -> float:
 def difference_variance(
     rover: Record, base: Record, slot: int, phase: bool, age: float, baseline: float, cfg: Record
 ) -> float:
-    """Variance (m^2) of a single difference."""
+    """Variance (m^2) of a single difference.
+
+    What grows with the distance is in it where no network has taken it off.
+    """
     sigma = cfg["phase_sigma"][slot]
     if not phase:
         sigma = cfg["code_sigma"][slot] * cfg["system_scale"][rover["system"]]
@@ -127,7 +136,10 @@ def difference_variance(
     factor += noise_factor(model, base["elevation"], base["cn0"][slot])
     clock = cfg["clock_stability"] * SPEED_OF_LIGHT_M_S * age
     distance = cfg["baseline_noise"] * baseline
-    return sigma * sigma * factor + clock * clock + 2.0 * distance * distance
+    variance = sigma * sigma * factor + clock * clock
+    if rover["network_known"][slot] == 1:
+        return variance + rover["network_std"][slot] * rover["network_std"][slot]
+    return variance + 2.0 * distance * distance
 
 
 @njit(cache=True)
@@ -168,6 +180,7 @@ def build_measures(
                         continue
                     a, b = rover[pairs[p]["rover"]], base[pairs[p]["base"]]
                     value = difference(a, b, slot, kind == 1)
+                    value -= a["network"][slot] if kind == 1 else a["network_code"][slot]
                     satellite = pairs[p]["satellite"]
                     state = s["amb"][satellite, slot]
                     if value != value or (kind == 1 and state < 0):

@@ -22,6 +22,8 @@ BEIDOU: Final = 3
 QZSS: Final = 4
 FIRST: Final = (0, 32, 64, 104, 168)
 COUNT: Final = (32, 32, 40, 64, 12)
+NOT_YET: Final = 2**62
+"""In place of the log time of what has not come."""
 SATELLITES: Final = 180
 """Satellites of all systems."""
 
@@ -37,6 +39,7 @@ EPOCH_DTYPE: Final = np.dtype(
         ("clock", "<f8"),  # m, c times receiver less GPS time
         ("age", "<f8"),  # s
         ("used", "<i8"),  # satellites
+        ("needed", "<i8"),  # ns, log time of what else it waited for, 0 for nothing
     ],
     align=True,
 )
@@ -79,6 +82,11 @@ MEASURED_DTYPE: Final = np.dtype(
         ("hydrostatic_mapping", "<f8"),
         ("wet_mapping", "<f8"),
         ("shapiro", "<f8"),  # m, 0 where not modelled
+        # From a network of stations, known where `network_known` is 1, else 0.
+        ("network_known", "<i8", SLOTS),
+        ("network", "<f8", SLOTS),  # m, error of the phase against the master's
+        ("network_code", "<f8", SLOTS),  # m, of the pseudorange
+        ("network_std", "<f8", SLOTS),  # m
     ],
     align=True,
 )

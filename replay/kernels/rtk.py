@@ -24,7 +24,7 @@ from replay.kernels.double_difference import (
 )
 from replay.kernels.earth import enu_axes
 from replay.kernels.elementary import sqrt
-from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
+from replay.kernels.gnss_records import NOT_YET, SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.kalman import scalar_update, whitened_update
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.rtk_output import (
@@ -80,8 +80,8 @@ _SURE_PART = 0.1
 
 @njit(cache=True)
 def match_epochs(
-    rover_t: Array, rover_log: Array, base_t: Array, base_log: Array, now: int, last: int,
-    tolerance: int, wait: int, max_age: int, partner: Array, release: Array,
+    rover_t: Array, rover_log: Array, base_t: Array, base_log: Array, needed: Array, now: int,
+    last: int, tolerance: int, wait: int, max_age: int, partner: Array, release: Array,
 ) -> int:  # fmt: skip
     """Say which rover epochs can be worked on by now, with which base epoch, and since when.
 
@@ -95,6 +95,8 @@ def match_epochs(
     rover_t, rover_log : int64 arrays (n,), ns
         Epochs that wait, in the order of their arrival.
     base_t, base_log : int64 arrays (m,), ns
+    needed : int64 array (n,), ns
+        Log time of whatever else a rover's epoch waits for, :data:`NOT_YET` before it came.
     now : int, ns
         Log time up to which rows are known.
     last : int, ns
@@ -126,8 +128,8 @@ def match_epochs(
         while late_base < m and base_log[late_base] < deadline:
             late_base += 1
         at = -1
-        if same < m:
-            at = base_log[same]
+        if same < m and needed[k] != NOT_YET:
+            at = max(base_log[same], needed[k])
         if late_base < m and (at < 0 or base_log[late_base] < at):
             at = base_log[late_base]
         if late_rover < n and (at < 0 or rover_log[late_rover] < at):
@@ -342,15 +344,16 @@ def heed_base(epochs: Array, rows: Array, until: int, span: int, s: Record) -> N
 @njit(cache=True)
 def _float_epoch(
     part: Array, base_part: Array, t: int, age: float, s: Record, x: Array, P: Array, cfg: Record,
-    place: Array, base_x: Array, up: Array, v: Array, velocity_cov: Array, moves: bool,
-    pairs: Array, measures: Array, starts: Array, broken: Array, before: Array, u: Array,
+    place: Array, coarse: Array, base_x: Array, up: Array, v: Array, velocity_cov: Array,
+    moves: bool, pairs: Array, measures: Array, starts: Array, broken: Array, before: Array,
+    u: Array,
 ) -> int:  # fmt: skip
     """Predict and update one epoch; how many measurements there were.
 
     `before` is filled with the predicted states, which `z` of the measures is about.
     """
-    count = pair_rows(part, base_part, age, cfg, place, base_x, up, pairs, u)
-    compare_frequencies(part, base_part, pairs, count, t, s, cfg["geometry_free"])
+    count = pair_rows(part, base_part, age, cfg, place, coarse, base_x, up, pairs, u)
+    compare_frequencies(part, base_part, pairs, count, t, s, cfg)
     baseline2 = 0.0
     for c in range(3):
         baseline2 += (place[c] - base_x[c]) * (place[c] - base_x[c])
@@ -369,7 +372,7 @@ def _float_epoch(
     total = 0
     for turn in range(2):
         if turn == 1 or cfg["dynamics"] != KINEMATIC:
-            pair_rows(part, base_part, age, cfg, before[:3], base_x, up, pairs, u)
+            pair_rows(part, base_part, age, cfg, before[:3], coarse, base_x, up, pairs, u)
         groups = build_measures(
             part, base_part, pairs, count, abs(age), baseline, s, cfg, before, measures, starts
         )
@@ -535,8 +538,8 @@ def run_rtk(
                     base_x[i] = own[1]["x"][i]
         if here:
             total = _float_epoch(
-                part, base_part, epoch["t"], age, s, x, P, cfg, own[0]["x"], base_x, up, v,
-                velocity_cov, moves, pairs, measures, starts, broken, before, u,
+                part, base_part, epoch["t"], age, s, x, P, cfg, own[0]["x"], epoch["x"], base_x,
+                up, v, velocity_cov, moves, pairs, measures, starts, broken, before, u,
             )  # fmt: skip
             for satellite in range(SATELLITES):
                 for slot in range(SLOTS):

@@ -21,6 +21,8 @@ from replay.kernels.types import Array, Record
 
 _NODES: Final = 20_000
 _LARGEST_RATIO: Final = 9999.9
+# Cycles: a phase whose own deviation is more tells no integer.
+_BLUR: Final = 0.25
 
 CANDIDATE_DTYPE: Final = np.dtype(
     [
@@ -90,6 +92,9 @@ def find_candidates(
                 continue
             if s["lock"][satellite, slot] < cfg["lock"]:
                 continue
+            wavelength = SPEED_OF_LIGHT_M_S / rover[pair["rover"]]["frequency"][slot]
+            if not m["r"] < _BLUR * _BLUR * wavelength * wavelength:
+                continue
             best = highest[system, slot]
             if turn == 0:
                 if best < 0 or pair["elevation"] > pairs[measures[best]["pair"]]["elevation"]:
@@ -104,7 +109,7 @@ def find_candidates(
                 c["slot"] = slot
                 c["state"] = s["amb"][satellite, slot]
                 c["base"] = s["amb"][reference, slot]
-                c["wavelength"] = SPEED_OF_LIGHT_M_S / rover[pair["rover"]]["frequency"][slot]
+                c["wavelength"] = wavelength
                 c["elevation"] = pair["elevation"]
     return count
 

@@ -62,7 +62,7 @@ def heed_breaks(rows: Array, end: int, s: Record) -> None:
 
 @njit(cache=True)
 def compare_frequencies(
-    rover: Array, base: Array, pairs: Array, count: int, t: int, s: Record, limit: float
+    rover: Array, base: Array, pairs: Array, count: int, t: int, s: Record, cfg: Record
 ) -> None:
     """Find jumps between two phases of one satellite, from which the geometry drops out.
 
@@ -72,9 +72,10 @@ def compare_frequencies(
     pairs : array of PAIR_DTYPE
     count : int
     t : int, ns
-    s : record of RTK_STATE_DTYPE
-    limit : float, m
+    s, cfg : records of RTK_STATE_DTYPE, RTK_CONFIG_DTYPE
     """
+    limit = cfg["geometry_free"]
+    join = max(_JOIN_S, cfg["gap"])
     for p in range(count):
         a, b = rover[pairs[p]["rover"]], base[pairs[p]["base"]]
         satellite = pairs[p]["satellite"]
@@ -83,7 +84,7 @@ def compare_frequencies(
             value = first - difference(a, b, slot, True)
             if value != value:
                 continue
-            recent = (t - s["free_t"][satellite, slot]) * 1e-9 < _JOIN_S
+            recent = (t - s["free_t"][satellite, slot]) * 1e-9 < join
             if recent and abs(value - s["free"][satellite, slot]) > limit:
                 s["slip"][satellite, 0] = 1
                 s["slip"][satellite, slot] = 1

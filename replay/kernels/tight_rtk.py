@@ -220,8 +220,8 @@ def _float_update(
     x, P, pairs, measures, joint, starts, broken, source, place, speed, arm, up, u, before = room
     antenna(s, work, tcfg["lever"], place, speed)
     _arm(s, tcfg["lever"], arm)
-    count = pair_rows(part, base_part, age, rcfg, place, base_x, up, pairs, u)
-    compare_frequencies(part, base_part, pairs, count, epoch["t"], q, rcfg["geometry_free"])
+    count = pair_rows(part, base_part, age, rcfg, place, epoch["x"], base_x, up, pairs, u)
+    compare_frequencies(part, base_part, pairs, count, epoch["t"], q, rcfg)
     baseline2 = 0.0
     for c in range(3):
         baseline2 += (place[c] - base_x[c]) * (place[c] - base_x[c])

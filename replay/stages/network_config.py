@@ -25,12 +25,12 @@ class Integers(Section, frozen=True):
 
     code_sigma: tuple[
         Annotated[float, quantity("m", "of one receiver in the zenith, by signal slot")], ...
-    ] = (0.5,)
+    ] = (0.3,)
     phase_sigma: tuple[
         Annotated[float, quantity("m", "of one receiver in the zenith, by signal slot")], ...
     ] = (0.005,)
     weighting: Weighting = "sum"
-    ionosphere_sigma: Annotated[float, quantity("1", "slant, m per m of baseline")] = 1e-5
+    ionosphere_sigma: Annotated[float, quantity("1", "slant, m per m of baseline")] = 4e-6
     ionosphere_noise: Annotated[float, quantity("1", "walk in 1 s, m per m of baseline")] = 1e-7
     wet_sigma: Annotated[float, quantity("m", "zenith, of each station")] = 0.05
     wet_noise: Annotated[float, quantity("m", "walk in 1 s, zenith, of each station")] = 1e-5
@@ -62,9 +62,8 @@ class Errors(Section, frozen=True):
     acceleration_noise: Annotated[
         float, quantity("1", "m/s^2 in sqrt(s), walk of the acceleration")
     ] = 2e-7
-    multipath_sigma: Annotated[float, quantity("m", "Gauss-Markov deviation, in the zenith")] = (
-        0.005
-    )
+    # Less than `integers.phase_sigma`, which is of multipath and noise together.
+    multipath_sigma: Annotated[float, quantity("m", "of one receiver in the zenith")] = 0.004
     multipath_tau: Annotated[float, quantity("s", "its correlation time")] = 30.0
     gate: Annotated[float, quantity("1", "innovation over its deviation; 0 lets all in")] = 5.0
     rejections: int = 5  # in a row, after which the filter of a double difference begins anew
@@ -74,8 +73,11 @@ class Errors(Section, frozen=True):
 class Interpolation(Section, frozen=True):
     """How the errors at the stations become those at the rover."""
 
-    # Plane through the master, linear combination, inverse distances.
-    method: Literal["lim", "lcm", "dim"] = "lim"
+    # Plane through the master, linear combination, inverse distances, collocation.
+    method: Literal["lim", "lcm", "dim", "lsc"] = "lim"
+    slope: Annotated[float, quantity("1", "m per m, deviation of the errors' slopes")] = 4e-6
+    curvature: Annotated[float, quantity("1", "1/m, deviation of their second derivatives")] = 3e-12
+    # Longer than the stations' interval: of older errors nobody waits for the next ones.
     max_age: Annotated[float, quantity("s", "of a station's errors; carried on by their rate")] = (
         10.0
     )

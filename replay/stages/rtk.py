@@ -50,7 +50,7 @@ from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
 from replay.stages.spp_config import WEIGHTINGS
-from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, HeldEpochs
+from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, HeldEpochs, longest_gap
 
 Array = np.ndarray[Any, Any]
 
@@ -75,23 +75,35 @@ class RtkState(HeldEpochs):
 
 
 class Rtk:
-    """The stage `rtk`."""
+    """The stage `rtk`.
 
-    spec = StageSpec(
-        name="rtk",
-        version=1,
-        inputs=tuple(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
-        outputs=(
-            Port(channels.FILTER_INNOVATIONS),
-            Port(channels.FILTER_GEOMETRY),
-            Port(channels.FILTER_AMBIGUITIES),
-            Port(channels.FILTER_RESOLUTION),
-            Port(channels.RELATIVE_POSITION),
-            Port(channels.FILTER_EVENTS),
-            Port(channels.SOLUTION),
-        ),
-        trigger=Port(channels.GNSS_OBS),
-    )
+    Parameters
+    ----------
+    corrected : bool
+        Whether a network of stations tells the rover's errors against the base.
+    """
+
+    def __init__(self, corrected: bool = False) -> None:
+        self.corrected = corrected
+        network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
+        self.spec = StageSpec(
+            name="rtk",
+            version=1,
+            inputs=(
+                *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
+                *network,
+            ),
+            outputs=(
+                Port(channels.FILTER_INNOVATIONS),
+                Port(channels.FILTER_GEOMETRY),
+                Port(channels.FILTER_AMBIGUITIES),
+                Port(channels.FILTER_RESOLUTION),
+                Port(channels.RELATIVE_POSITION),
+                Port(channels.FILTER_EVENTS),
+                Port(channels.SOLUTION),
+            ),
+            trigger=Port(channels.GNSS_OBS),
+        )
 
     def start(self, config: Section, context: Context) -> RtkState:
         """State before the first row."""
@@ -102,7 +114,7 @@ class Rtk:
         base = config.base
         return RtkState(
             selection=select_signals(config.gnss.signals, config.gnss.systems),
-            config=rtk_config(config, single),
+            config=rtk_config(config, single, context),
             single=single,
             times=(round(base.tolerance * _NS), round(base.wait * _NS), round(base.max_age * _NS)),
             kernel=rtk_records.new_rtk_state(),
@@ -112,7 +124,11 @@ class Rtk:
 
     def step(self, state: RtkState, block: Block) -> tuple[RtkState, Outputs]:
         """Take a block of epochs of both receivers."""
+        waiting = len(state.epochs)
         state.take(block, state.selection)
+        if self.corrected:
+            state.expect_corrections(waiting)
+            state.correct(block)
         return state, self._run(state, int(state.now[0]))
 
     def finish(self, state: RtkState) -> Outputs:
@@ -152,7 +168,8 @@ class Rtk:
             np.ascontiguousarray(state.epochs["log_t"]),
             np.ascontiguousarray(state.base_epochs["t"]),
             np.ascontiguousarray(state.base_epochs["log_t"]),
-            now, int(state.released[0]), tolerance, wait, max_age, partner, release,
+            np.ascontiguousarray(state.epochs["needed"]), now, int(state.released[0]), tolerance,
+            wait, max_age, partner, release,
         )  # fmt: skip
         return partner, release, ready
 
@@ -165,6 +182,7 @@ class Rtk:
         if ready == 0:
             self._forget(state)
             return {}
+        state.late_corrections(release[:ready])
         epochs = state.epochs[:ready]
         end = int(epochs["first"][-1] + epochs["count"][-1])
         solutions = np.zeros(ready, dtype=single_point.SINGLE_ROW_DTYPE)
@@ -223,7 +241,7 @@ def _dump_types() -> dict[str, np.dtype[Any]]:
     }
 
 
-def rtk_config(config: RtkConfig | RtkInsConfig, single: Array) -> Array:
+def rtk_config(config: RtkConfig | RtkInsConfig, single: Array, context: Context) -> Array:
     """Settings as the record that the compiled loop reads.
 
     Raises
@@ -256,6 +274,7 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array) -> Array:
     for name in motion.__struct_fields__:
         if name not in ("dynamics", "ionosphere", "troposphere"):
             record[name] = getattr(motion, name)
+    record["gap"] = longest_gap(motion.gap, context, Port(channels.GNSS_OBS))
     record["dynamics"] = _DYNAMICS.index(motion.dynamics)
     record["ionosphere"] = int(motion.ionosphere)
     record["troposphere"] = int(motion.troposphere)

@@ -72,27 +72,37 @@ class RtkInsState(HeldSamples, HeldEpochs):
 
 
 class RtkInertial:
-    """The stage `rtk-ins-tc`."""
+    """The stage `rtk-ins-tc`.
 
-    spec = StageSpec(
-        name="rtk-ins-tc",
-        version=1,
-        inputs=(
-            Port(channels.IMU),
-            *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
-        ),
-        outputs=(
-            Port(channels.FILTER_INNOVATIONS),
-            Port(channels.FILTER_GEOMETRY),
-            Port(channels.FILTER_AMBIGUITIES),
-            Port(channels.FILTER_RESOLUTION),
-            Port(channels.FILTER_STATE),
-            Port(channels.FILTER_COVARIANCE),
-            Port(channels.FILTER_EVENTS),
-            Port(channels.SOLUTION),
-        ),
-        trigger=Port(channels.GNSS_OBS),
-    )
+    Parameters
+    ----------
+    corrected : bool
+        Whether a network of stations tells the rover's errors against the base.
+    """
+
+    def __init__(self, corrected: bool = False) -> None:
+        self.corrected = corrected
+        network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
+        self.spec = StageSpec(
+            name="rtk-ins-tc",
+            version=1,
+            inputs=(
+                Port(channels.IMU),
+                *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
+                *network,
+            ),
+            outputs=(
+                Port(channels.FILTER_INNOVATIONS),
+                Port(channels.FILTER_GEOMETRY),
+                Port(channels.FILTER_AMBIGUITIES),
+                Port(channels.FILTER_RESOLUTION),
+                Port(channels.FILTER_STATE),
+                Port(channels.FILTER_COVARIANCE),
+                Port(channels.FILTER_EVENTS),
+                Port(channels.SOLUTION),
+            ),
+            trigger=Port(channels.GNSS_OBS),
+        )
 
     def start(self, config: Section, context: Context) -> RtkInsState:
         """State before the first row."""
@@ -108,14 +118,18 @@ class RtkInertial:
             selection=select_signals(config.gnss.signals, config.gnss.systems),
             config=inertial_config(config, context),
             tight_config=tight_record(config),
-            rtk_config=rtk_config(config, single_config(config.gnss, config.spp)),
+            rtk_config=rtk_config(config, single_config(config.gnss, config.spp), context),
             filter=records.new_state(_STATES),
             kernel=rtk_records.new_rtk_state(),
         )
 
     def step(self, state: RtkInsState, block: Block) -> tuple[RtkInsState, Outputs]:
         """Take a block of inertial samples and of epochs of both receivers."""
+        waiting = len(state.epochs)
         state.take(block, state.selection)
+        if self.corrected:
+            state.expect_corrections(waiting)
+            state.correct(block)
         imu = block.get(channels.IMU.name)
         if imu is not None:
             state.now[0] = max(int(state.now[0]), int(imu.log_time_ns[-1]))
@@ -153,10 +167,11 @@ class RtkInertial:
         ready = rtk.match_epochs(
             np.ascontiguousarray(state.epochs["t"]),
             np.ascontiguousarray(state.epochs["log_t"]),
-            times[order], arrivals[order],
+            times[order], arrivals[order], np.ascontiguousarray(state.epochs["needed"]),
             int(state.now[0]), int(state.released[0]), round(base.tolerance * _NS),
             wait, round(base.max_age * _NS), partner, release,
         )  # fmt: skip
+        state.late_corrections(release[:ready])
         found = partner >= 0
         partner[found] = order[partner[found]]
         epochs = state.epochs[:ready].copy()

@@ -126,6 +126,25 @@ class SinglePoint:
         return state
 
 
+def excluded_satellites(gnss: Gnss) -> Array:
+    """1 for each satellite (180,) that is not to be used, by its dense number.
+
+    Raises
+    ------
+    ConfigurationError
+        Where a satellite is unknown.
+    """
+    excluded = np.zeros(len(SATELLITE_NAMES), dtype=np.int64)
+    names = [name.decode() for name in SATELLITE_NAMES]
+    for name in gnss.exclude:
+        if name not in names:
+            raise ConfigurationError(
+                f"gnss.exclude: no satellite {name!r}", mend='write them as "G05"'
+            )
+        excluded[names.index(name)] = 1
+    return excluded
+
+
 def single_config(gnss: Gnss, spp: Spp) -> Array:
     """Settings as the record that the compiled loop reads.
 
@@ -135,13 +154,7 @@ def single_config(gnss: Gnss, spp: Spp) -> Array:
         Where a satellite is unknown or a list has the wrong length.
     """
     record = np.zeros(1, dtype=single_point.SINGLE_CONFIG_DTYPE)
-    names = [name.decode() for name in SATELLITE_NAMES]
-    for name in gnss.exclude:
-        if name not in names:
-            raise ConfigurationError(
-                f"gnss.exclude: no satellite {name!r}", mend='write them as "G05"'
-            )
-        record["excluded"][0, names.index(name)] = 1
+    record["excluded"] = excluded_satellites(gnss)
     if len(spp.system_scale) not in (1, SYSTEMS):
         raise ConfigurationError(f"spp.system_scale has {SYSTEMS} numbers or one")
     record["mask"] = gnss.mask

@@ -11,10 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from replay import channels
-from replay.gnss.measurements import Epochs, Selection, gather_epochs
-from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE
+from replay.gnss.measurements import Epochs, Selection, characters, gather_epochs
+from replay.kernels import gathering
+from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, NOT_YET
 from replay.log.columns import Columns
-from replay.stages.base import BASE, RECEIVER, Block, Port
+from replay.stages.base import BASE, RECEIVER, Block, Context, Port
 
 Array = np.ndarray[Any, Any]
 
@@ -35,6 +36,7 @@ EPOCH_READS: Final = (
 """What makes whole epochs of a receiver."""
 
 _NS: Final = 1_000_000_000
+_INTERVALS: Final = 2.5
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -76,20 +78,49 @@ class HeldEpochs:
     now: Array = dataclasses.field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     released: Array = dataclasses.field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
-    def take(self, block: Block, selection: Selection) -> None:
+    def take(
+        self, block: Block, selection: Selection, roles: tuple[str, str] = (RECEIVER, BASE)
+    ) -> None:
         """Take the epochs of both receivers in a block."""
-        for role in (RECEIVER, BASE):
+        for role in roles:
             found = read_epochs(block, selection, role)
             if found is None:
                 continue
             log_times = block[Port(channels.GNSS_OBS, role).name].log_time_ns
             self.now[0] = max(int(self.now[0]), int(log_times[-1]))
-            if role == RECEIVER:
+            if role == roles[0]:
                 self.epochs, self.rows = join_epochs(self.epochs, self.rows, found)
             else:
                 self.base_epochs, self.base_rows = join_epochs(
                     self.base_epochs, self.base_rows, found
                 )
+
+    def correct(self, block: Block) -> None:
+        """Take what a network says of the rover's epochs in a block, those that came before too."""
+        rows = block.get(channels.NETWORK_CORRECTIONS.name)
+        if rows is None:
+            return
+        self.now[0] = max(int(self.now[0]), int(rows.log_time_ns[-1]))
+        gathering.join_network(
+            self.epochs,
+            self.rows,
+            rows.valid_time_ns,
+            rows.log_time_ns,
+            characters(rows["satellite"], 3),
+            characters(rows["signal"], 2),
+            np.stack([rows["correction_m"], rows["correction_std_m"]], axis=1),
+        )
+
+    def expect_corrections(self, start: int) -> None:
+        """Let the rover's epochs from `start` on wait for what a network says of them."""
+        self.epochs["needed"][start:] = NOT_YET
+
+    def late_corrections(self, release: Array) -> None:
+        """Take off the epochs released what came only after their release."""
+        for place in np.flatnonzero(self.epochs["needed"][: len(release)] > release):
+            first, count = self.epochs["first"][place], self.epochs["count"][place]
+            for name in ("network_known", "network", "network_code", "network_std"):
+                self.rows[name][first : first + count] = 0
 
     def forget(self, count: int) -> None:
         """Drop the rover's first epochs."""
@@ -112,6 +143,15 @@ EPOCH_TYPES: Final[dict[str, np.dtype[Any]]] = {
     "released": np.dtype(np.int64),
 }
 """Of the fields of :class:`HeldEpochs`, for dumps."""
+
+
+def longest_gap(least_s: float, context: Context, observations: Port) -> float:
+    """Seconds without a phase that end its ambiguity: what is set, and two missing epochs."""
+    rows = context.heads.get(observations.name)
+    times = np.unique(rows.valid_time_ns) if rows is not None else np.zeros(0)
+    if len(times) < 2:
+        return least_s
+    return max(least_s, _INTERVALS * float(np.diff(times).min()) / _NS)
 
 
 def read_epochs(block: Block, selection: Selection, role: str = RECEIVER) -> Epochs | None:

@@ -315,7 +315,7 @@ def test_cutting_the_log_changes_no_bit(late):
             assert (rows.log_time_ns == max(ends)).all()
         many.append(outputs)
     many.append(stage.finish(state))
-    for port in Rtk.spec.outputs:
+    for port in Rtk().spec.outputs:
         if port.channel == channels.FILTER_EVENTS:
             continue
         a, b = whole(one, port.channel), whole(many, port.channel)
