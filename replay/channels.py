@@ -149,6 +149,13 @@ RECEIVER: Final = ChannelSpec(
         "interval_s": Tolerance(1e-9, "s"),
     },
 )
+ANTENNAS: Final = ChannelSpec(
+    "ANTENNAS",
+    "/gnss/antennas",
+    "replay.AntennaCalibration",
+    "phase centres of antennas",
+    key=("antenna", "serial", "frequency"),
+)
 RECEIVER_EPOCH: Final = ChannelSpec(
     "RECEIVER_EPOCH",
     "/gnss/{receiver}/epochs",
@@ -212,6 +219,7 @@ CORRECTIONS: Final = ChannelSpec(
         "hydrostatic_mapping": Tolerance(1e-6, "1"),
         "wet_mapping": Tolerance(1e-6, "1"),
         "shapiro_m": _M,
+        "antenna_m": _M,
     },
 )
 COARSE: Final = ChannelSpec(
@@ -514,6 +522,7 @@ CHECKPOINT: Final = ChannelSpec(
 CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     IMU,
     RECEIVER,
+    ANTENNAS,
     NAV,
     NAV_IONOSPHERE,
     NAV_TIME,

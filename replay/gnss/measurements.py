@@ -51,6 +51,7 @@ _CORRECTED: Final = (
     "wet_mapping",
     "shapiro_m",
 )
+_ANTENNA: Final = "antenna_m"
 SATELLITE_NAMES: Final = np.array(
     [
         f"{letter}{prn:02d}"
@@ -235,7 +236,7 @@ def gather_epochs(
             corrections.log_time_ns,
             characters(corrections["satellite"], 3),
             characters(corrections["signal"], 2),
-            np.stack([corrections[name].astype(np.float64) for name in _CORRECTED], axis=1),
+            _corrected(corrections),
         )
     if coarse is not None:
         placed = np.concatenate(
@@ -254,6 +255,16 @@ def gather_epochs(
             coarse["satellite_count"].astype(np.int64),
         )
     return Epochs(epochs, rows, int(counts[2]))
+
+
+def _corrected(corrections: Columns) -> Array:
+    """Terms `(n, 12)` as the compiled loop reads them; the antenna's is 0 where it is absent."""
+    terms = np.zeros((len(corrections), len(_CORRECTED) + 1))
+    for place, name in enumerate(_CORRECTED):
+        terms[:, place] = corrections[name]
+    if _ANTENNA in corrections.values:
+        terms[:, -1] = np.where(corrections.is_present(_ANTENNA), corrections[_ANTENNA], 0.0)
+    return terms
 
 
 def characters(names: Array, width: int) -> Array:

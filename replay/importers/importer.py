@@ -25,7 +25,7 @@ from replay.importers.result import ImportResult, compare_digests
 from replay.importers.rtklib_pos import read_pos
 from replay.importers.rtklib_tag import Tag, read_tag
 from replay.importers.spec import Channel, Spec, load_spec
-from replay.importers.streams import Streams, check_formats
+from replay.importers.streams import Streams, check_formats, reading_order
 from replay.importers.table import Int64, Mask, Table
 from replay.log.columns import Columns
 from replay.log.writer import LogWriter
@@ -168,7 +168,7 @@ class _Import:
             Where a channel gives a stream's topic too.
         """
         streams = Streams(self.findings)
-        for name, stream in self.spec.streams.items():
+        for name, stream in reading_order(self.spec):
             for source in stream.sources:
                 file = self.spec.sources[source].file
                 self.progress(f"{name}: reading {file}")

@@ -193,7 +193,8 @@ class Stream(Section, frozen=True):
     `available` says when a navigation message is known: from the `start` of the log,
     as a program sees it that works on a finished recording, or from when it was
     `transmitted`; left out, the format's own way. `position_ecef_m` stands in for the
-    approximate position that the file states.
+    approximate position that the file states. Of an ANTEX file the antennas are read that
+    the receivers of the other streams name; `satellites` adds those of all satellites.
 
     Of receivers' binary formats: `approximate_time` is a GPS date near the start for
     files that do not tell theirs; `lever_arm` goes with the receiver's own fixes, and
@@ -212,6 +213,7 @@ class Stream(Section, frozen=True):
         0.0,
     )
     truth: bool = False
+    satellites: bool = False
     gyro_scale: Annotated[float, quantity("rad", "of one count of raw inertial samples")] = 0.0
     accel_scale: Annotated[float, quantity("m/s", "of one count of raw inertial samples")] = 0.0
 

@@ -2,7 +2,8 @@
 
 To add a format, write a function that takes a file's bytes, the findings and the
 spec's table and gives columns by topic, each in the order of its log times, and name
-it in :data:`FORMATS`. Rows of several files are joined here.
+it in :data:`FORMATS`. Rows of several files are joined here. A format that must know
+what the others gave is read after them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from replay import channels, time
 from replay.errors import ConfigurationError, ForeignFileError
 from replay.importers import receiver_streams
+from replay.importers.antex_streams import Known, antex_stream
 from replay.importers.corrected_ranges import corrected_ranges_stream
 from replay.importers.files import File
 from replay.importers.findings import Findings
@@ -26,6 +28,7 @@ from replay.log.codec import codec_for
 from replay.log.columns import Columns, Int64, concatenate
 
 Reader = Callable[[File, Findings, Stream], Mapping[str, Columns]]
+LateReader = Callable[[File, Findings, Stream, Known], Mapping[str, Columns]]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -36,12 +39,16 @@ class Format:
     ----------
     read : function
         File, findings and stream to columns by topic. A time of -1 is unknown.
+        None for one that is read late.
     available : str
         When a navigation message is known where the spec does not say.
+    read_late : function
+        As `read`, after all other streams, given what they tell.
     """
 
-    read: Reader
+    read: Reader | None
     available: Literal["start", "transmitted"] = "transmitted"
+    read_late: LateReader | None = None
 
 
 FORMATS: Final[dict[str, Format]] = {
@@ -53,9 +60,15 @@ FORMATS: Final[dict[str, Format]] = {
     "sbf": Format(receiver_streams.sbf_stream),
     "novatel": Format(receiver_streams.novatel_stream),
     "nmea": Format(receiver_streams.nmea_stream),
+    "antex": Format(None, available="start", read_late=antex_stream),
 }
 TABLE_FORMATS: Final = ("csv", "rtklib-pos", "matlab")
-_NAVIGATION: Final = (channels.NAV.topic, channels.NAV_IONOSPHERE.topic, channels.NAV_TIME.topic)
+_NAVIGATION: Final = (
+    channels.NAV.topic,
+    channels.NAV_IONOSPHERE.topic,
+    channels.NAV_TIME.topic,
+    channels.ANTENNAS.topic,
+)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +101,16 @@ def check_formats(spec: Spec) -> None:
                     )
 
 
+def reading_order(spec: Spec) -> list[tuple[str, Stream]]:
+    """Streams in the order of the spec, but those that must know of others last."""
+
+    def late(item: tuple[str, Stream]) -> bool:
+        forms = (spec.sources[source].format for source in item[1].sources)
+        return any(FORMATS[form].read_late is not None for form in forms)
+
+    return sorted(spec.streams.items(), key=late)
+
+
 class Streams:
     """Rows of all streams of a spec, topic by topic.
 
@@ -112,7 +135,7 @@ class Streams:
         """
         count = 0
         available = stream.available or FORMATS[form].available
-        for topic, columns in FORMATS[form].read(file, self._findings, stream).items():
+        for topic, columns in self._read(form, file, stream).items():
             parts = self._parts.setdefault(topic, [])
             if topic not in _NAVIGATION and any(part.stream != name for part in parts):
                 raise ConfigurationError(
@@ -136,6 +159,28 @@ class Streams:
             text = f"{file.name}: {stream.time_offset!r} s were added to the times that were read"
             self._findings.notes.append(text)
         return count
+
+    def _read(self, form: str, file: File, stream: Stream) -> Mapping[str, Columns]:
+        late, read = FORMATS[form].read_late, FORMATS[form].read
+        if late is not None:
+            return late(file, self._findings, stream, self._known())
+        assert read is not None
+        return read(file, self._findings, stream)
+
+    def _known(self) -> Known:
+        """Antennas of the receivers so far, in their order, and the time that their rows span."""
+        antennas: dict[str, None] = {}
+        times = []
+        for topic, parts in self._parts.items():
+            for part in parts:
+                if channels.RECEIVER.matches(topic):
+                    texts = part.columns.ragged("antenna").texts()
+                    antennas |= dict.fromkeys(text.rstrip() for text in texts)
+                if topic not in _NAVIGATION:
+                    valid = part.columns.valid_time_ns
+                    times += valid[valid >= 0].tolist()
+        antennas.pop("", None)
+        return Known(tuple(antennas), (min(times), max(times)) if times else None)
 
     def topics(self) -> dict[str, str]:
         """Topic of each name, which is that of the stream and the topic."""

@@ -5,9 +5,10 @@ share both times. The loops walk them side by side. Valid times need not rise: a
 that arrives late is an epoch like any other.
 """
 
+import numpy as np
 from numba import njit
 
-from replay.kernels.gnss_records import SLOTS, satellite_number, system_of_letter
+from replay.kernels.gnss_records import NOT_YET, SLOTS, satellite_number, system_of_letter
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.types import Array, Record
 
@@ -240,7 +241,7 @@ def join_corrections(
     signal: Array,
     values: Array,
 ) -> None:
-    """Fill the terms of the corrections.
+    """Fill the terms of the corrections, and take what the antenna adds off code and phase.
 
     Parameters
     ----------
@@ -248,8 +249,9 @@ def join_corrections(
     t, log_t : int64 arrays (n,), ns
     satellite : uint8 array (n, 3)
     signal : uint8 array (n, 2)
-    values : float64 array (n, 11)
-        Fields of `replay.SignalCorrections` from `distance_m` to `shapiro_m`.
+    values : float64 array (n, 12)
+        Fields of `replay.SignalCorrections` from `distance_m` to `antenna_m`, the last 0 where
+        the antenna is not modelled.
     """
     i = 0
     n = t.shape[0]
@@ -267,6 +269,8 @@ def join_corrections(
                     code = signal[p, 0] + 256 * signal[p, 1]
                     for slot in range(SLOTS):
                         if row["signal"][slot] == code:
+                            row["code"][slot] -= values[p, 11]
+                            row["phase"][slot] -= values[p, 11]
                             row["group_delay"][slot] = values[p, 4]
                             row["ionosphere"][slot] = values[p, 5]
                             row["distance"] = values[p, 0]
@@ -284,6 +288,78 @@ def join_corrections(
                 elif number > row["satellite"]:
                     break
                 p += 1
+
+
+@njit(cache=True)
+def join_network(
+    epochs: Array, rows: Array, t: Array, log_t: Array, satellite: Array, signal: Array,
+    values: Array,
+) -> None:  # fmt: skip
+    """Fill what a network of stations says of the rover's errors.
+
+    The two frequencies of a satellite tell the dispersive part from the rest, so that codes
+    and further frequencies have corrections too. An epoch takes what came first.
+
+    Parameters
+    ----------
+    epochs, rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
+        `needed` is filled with the log time.
+    t, log_t : int64 arrays (n,), ns
+    satellite : uint8 array (n, 3)
+    signal : uint8 array (n, 2)
+    values : float64 array (n, 2), m
+        Correction and its deviation.
+    """
+    n = t.shape[0]
+    i = 0
+    while i < n:
+        end = i
+        while end < n and t[end] == t[i] and log_t[end] == log_t[i]:
+            end += 1
+        for e in range(epochs.shape[0]):
+            epoch = epochs[e]
+            if epoch["t"] != t[i] or epoch["needed"] != NOT_YET:
+                continue
+            epoch["needed"] = log_t[i]
+            for k in range(epoch["first"], epoch["first"] + epoch["count"]):
+                for j in range(i, end):
+                    _, _, number = _number(satellite[j])
+                    if number == rows[k]["satellite"]:
+                        _correct(rows[k], signal[j, 0] + 256 * signal[j, 1], values[j])
+                _split(rows[k])
+            break
+        i = end
+
+
+@njit(cache=True)
+def _correct(row: Record, code: int, value: Array) -> None:
+    for slot in range(SLOTS):
+        if row["signal"][slot] == code:
+            row["network_known"][slot] = 1
+            row["network"][slot] = value[0]
+            row["network_std"][slot] = value[1]
+
+
+@njit(cache=True)
+def _split(row: Record) -> None:
+    """Corrections of codes and of a third phase from those of two phases."""
+    if row["network_known"][0] == 0 or row["network_known"][1] == 0:
+        return
+    ratio = np.zeros(SLOTS)
+    for slot in range(SLOTS):
+        if row["frequency"][slot] > 0.0:
+            part = row["frequency"][0] / row["frequency"][slot]
+            ratio[slot] = part * part
+    delay = (row["network"][0] - row["network"][1]) / (ratio[1] - ratio[0])
+    rest = row["network"][0] + delay
+    for slot in range(SLOTS):
+        if ratio[slot] == 0.0:
+            continue
+        row["network_code"][slot] = rest + ratio[slot] * delay
+        if row["network_known"][slot] == 0:
+            row["network_known"][slot] = 1
+            row["network"][slot] = rest - ratio[slot] * delay
+            row["network_std"][slot] = row["network_std"][1]
 
 
 @njit(cache=True)

@@ -342,7 +342,7 @@ def _search(
 @njit(cache=True)
 def _write(
     usable: Array, n: int, pairs: Array, station: Array, master: Array, x: Array, P: Array,
-    k: Record, rcfg: Record, age: float, baseline: float, t: int, log_t: int,
+    k: Record, rcfg: Record, cfg: Record, age: float, baseline: float, t: int, log_t: int,
     ambiguities: Array, residuals: Array, counts: Array,
 ) -> None:  # fmt: skip
     """Ambiguities of an epoch, and what is left of the phases whose integers are known."""
@@ -404,7 +404,7 @@ def _write(
             out["reference"] = reference
             out["signal"] = signal
             out["residual"] = left - c["wavelength"][level] * integer[level]
-            out["sigma"] = sqrt(spread)
+            out["sigma"] = sqrt(spread) / cfg["phase_scale"]
 
 
 @njit(cache=True)
@@ -533,6 +533,6 @@ def run_baseline(
             row["known"] = known
             row["status"] = AMBIGUITY_FIXED if row["fixed"] > 0 else AMBIGUITY_REJECTED
         _write(
-            usable, many, pairs, part, base_part, x, P, k, rcfg, abs(age), baseline, t, log_t,
+            usable, many, pairs, part, base_part, x, P, k, rcfg, cfg, abs(age), baseline, t, log_t,
             ambiguities, residuals, counts,
         )  # fmt: skip

@@ -18,6 +18,7 @@ INTEGERS_CONFIG_DTYPE: Final = np.dtype(
         ("lock", "<i8"),  # epochs
         ("confirm", "<i8"),  # epochs
         ("doubt", "<i8"),  # epochs
+        ("phase_scale", "<f8"),  # by which the filter's deviation of a phase is more than its own
         ("least", "<i8"),  # double differences of a search from nothing
     ],
     align=True,

@@ -80,7 +80,7 @@ class CoarsePosition(_message.Message):
     def __init__(self, position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., clock_offset_m: _Optional[float] = ..., age_s: _Optional[float] = ..., satellite_count: _Optional[int] = ...) -> None: ...
 
 class SignalCorrections(_message.Message):
-    __slots__ = ("satellite", "signal", "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m", "ionosphere_m", "hydrostatic_m", "wet_m", "hydrostatic_mapping", "wet_mapping", "shapiro_m")
+    __slots__ = ("satellite", "signal", "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m", "ionosphere_m", "hydrostatic_m", "wet_m", "hydrostatic_mapping", "wet_mapping", "shapiro_m", "antenna_m")
     SATELLITE_FIELD_NUMBER: _ClassVar[int]
     SIGNAL_FIELD_NUMBER: _ClassVar[int]
     DISTANCE_M_FIELD_NUMBER: _ClassVar[int]
@@ -94,6 +94,7 @@ class SignalCorrections(_message.Message):
     HYDROSTATIC_MAPPING_FIELD_NUMBER: _ClassVar[int]
     WET_MAPPING_FIELD_NUMBER: _ClassVar[int]
     SHAPIRO_M_FIELD_NUMBER: _ClassVar[int]
+    ANTENNA_M_FIELD_NUMBER: _ClassVar[int]
     satellite: str
     signal: str
     distance_m: float
@@ -107,7 +108,8 @@ class SignalCorrections(_message.Message):
     hydrostatic_mapping: float
     wet_mapping: float
     shapiro_m: float
-    def __init__(self, satellite: _Optional[str] = ..., signal: _Optional[str] = ..., distance_m: _Optional[float] = ..., sagnac_m: _Optional[float] = ..., satellite_clock_m: _Optional[float] = ..., relativity_m: _Optional[float] = ..., group_delay_m: _Optional[float] = ..., ionosphere_m: _Optional[float] = ..., hydrostatic_m: _Optional[float] = ..., wet_m: _Optional[float] = ..., hydrostatic_mapping: _Optional[float] = ..., wet_mapping: _Optional[float] = ..., shapiro_m: _Optional[float] = ...) -> None: ...
+    antenna_m: float
+    def __init__(self, satellite: _Optional[str] = ..., signal: _Optional[str] = ..., distance_m: _Optional[float] = ..., sagnac_m: _Optional[float] = ..., satellite_clock_m: _Optional[float] = ..., relativity_m: _Optional[float] = ..., group_delay_m: _Optional[float] = ..., ionosphere_m: _Optional[float] = ..., hydrostatic_m: _Optional[float] = ..., wet_m: _Optional[float] = ..., hydrostatic_mapping: _Optional[float] = ..., wet_mapping: _Optional[float] = ..., shapiro_m: _Optional[float] = ..., antenna_m: _Optional[float] = ...) -> None: ...
 
 class CycleSlip(_message.Message):
     __slots__ = ("satellite", "signal", "detector", "statistic", "threshold", "size_cycles", "repaired")

@@ -67,7 +67,8 @@ def load_scenario(path: Path, tables: Iterable[Mapping[str, Any]] = ()) -> Scena
     ----------
     path : Path
     tables : iterable of mapping
-        Go over the file's, key by key.
+        Go over the file's, key by key. The file's own go over those of the files that
+        its `include` names.
 
     Raises
     ------
@@ -76,12 +77,7 @@ def load_scenario(path: Path, tables: Iterable[Mapping[str, Any]] = ()) -> Scena
     ConfigurationError
         For an unknown key, a wrong type, an impossible value.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"the scenario cannot be read: {error}", where=str(path)) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"the scenario is no TOML: {error}", where=str(path)) from error
+    table = _read_file(path)
     for over in tables:
         merge(table, over)
     try:
@@ -89,6 +85,28 @@ def load_scenario(path: Path, tables: Iterable[Mapping[str, Any]] = ()) -> Scena
     except ConfigurationError as error:
         where = f"{path}, {error.where}" if error.where else str(path)
         raise ConfigurationError(error.what, where=where, mend=error.mend) from error
+
+
+def _read_file(path: Path) -> Table:
+    """Table of a file, over those of the files that its `include` names."""
+    try:
+        own = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"the scenario cannot be read: {error}", where=str(path)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"the scenario is no TOML: {error}", where=str(path)) from error
+    included = own.pop("include", [])
+    if not isinstance(included, list) or not all(isinstance(name, str) for name in included):
+        raise ConfigurationError(
+            "include is no list of files", where=str(path), mend='write include = ["sky.toml"]'
+        )
+    table: Table = {}
+    for name in included:
+        if (path.parent / name).resolve() == path.resolve():
+            raise ConfigurationError("a scenario includes itself", where=str(path))
+        merge(table, _read_file(path.parent / name))
+    merge(table, own)
+    return table
 
 
 def read_scenario(table: Mapping[str, Any], folder: Path = Path()) -> Scenario:

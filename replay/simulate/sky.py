@@ -1,7 +1,7 @@
 """Settings of satellites, atmosphere, receivers and what stands in their way.
 
-In a scenario: `[sky]`, one `[[receivers]]` each, `[[blockage]]` and `[[slips]]`. Numbers in
-dB and dB-Hz are plain; the others may have a unit.
+In a scenario: `[sky]`, one `[[receivers]]` each, what they have in common in `[receiver]`,
+`[[blockage]]` and `[[slips]]`. Numbers in dB and dB-Hz are plain; the others may have a unit.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
-from replay.configuration import Section, Table, build, literal, quantity
+from replay.configuration import Section, Table, build, literal, merge, quantity
 from replay.errors import ConfigurationError
 from replay.gnss.signals import frequency_hz
 from replay.simulate.air import SIGNED, Ionosphere, Troposphere
@@ -195,6 +195,22 @@ def _lines(head: str, path: str, section: Section) -> Iterator[str]:
 SectionT = TypeVar("SectionT", bound=Section)
 
 
+def _with_common(table: Table) -> Any:
+    """Tables of the receivers over what the section `receiver` says of all of them."""
+    common, own = table.pop("receiver", {}), table.pop("receivers", [])
+    if not isinstance(common, Mapping):
+        raise ConfigurationError("receiver is no table", mend="write [receiver]")
+    if not isinstance(own, list) or not all(isinstance(one, Mapping) for one in own):
+        return own  # told by `_many`
+    tables: list[Table] = []
+    for one in own:
+        both: Table = {}
+        merge(both, common)
+        merge(both, one)
+        tables.append(both)
+    return tables
+
+
 def take_setup(table: Table, folder: Path = Path()) -> Setup:
     """Take the sections of observations out of a scenario's table.
 
@@ -211,7 +227,7 @@ def take_setup(table: Table, folder: Path = Path()) -> Setup:
     """
     given = [name for name in ("sky", "blockage", "slips") if name in table]
     sky = _read(Sky, table.pop("sky", {}), "sky")
-    receivers = _many(Receiver, table.pop("receivers", []), "receivers")
+    receivers = _many(Receiver, _with_common(table), "receivers")
     blockages = _many(Blockage, table.pop("blockage", []), "blockage")
     slips = _many(Slip, table.pop("slips", []), "slips")
     if given and not receivers:

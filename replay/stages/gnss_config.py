@@ -62,6 +62,7 @@ class Antenna(Section, frozen=True):
         Annotated[float, quantity("m", "ECEF, of the base's antenna; empty takes the log's")], ...
     ] = ()
     coast: Annotated[float, quantity("s", "an old position serves for orbits this long")] = 60.0
+    calibrated: bool = True  # use calibrations where the log has them
     # Pipelines without inertial samples do not use it; their evaluation does.
     lever_arm: tuple[Annotated[float, quantity("m", "body, IMU to antenna")], ...] = (
         0.0,

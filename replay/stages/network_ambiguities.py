@@ -8,6 +8,7 @@ nominal time. Positions are known; the arithmetic is in
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals, signal_names
-from replay.kernels import network_ambiguities, network_records, rtk, rtk_records
+from replay.kernels import elementary, network_ambiguities, network_records, rtk, rtk_records
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.sights import NOTE_DTYPE
 from replay.log.columns import Columns
@@ -34,7 +35,13 @@ from replay.stages.network_config import NetworkSettings
 from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns
 from replay.stages.spp import excluded_satellites
 from replay.stages.spp_config import WEIGHTINGS
-from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, HeldEpochs, longest_gap
+from replay.stages.waiting import (
+    EPOCH_READS,
+    EPOCH_TYPES,
+    HeldEpochs,
+    longest_gap,
+    nominal_interval,
+)
 
 Array = np.ndarray[Any, Any]
 
@@ -102,11 +109,12 @@ class NetworkAmbiguities:
             raise TypeError(f"{self.spec.name} takes the settings of a network")
         settings = config.integers
         observations = Port(channels.GNSS_OBS, self.roles[0])
-        gap = longest_gap(settings.gap, context, observations)
+        interval = nominal_interval(context, observations)
+        gap = longest_gap(settings.gap, interval)
         return BaselineState(
             selection=select_signals(config.gnss.signals, config.gnss.systems),
-            config=_float_record(config, gap),
-            integers_config=_integers_record(config),
+            config=_float_record(config, gap, interval),
+            integers_config=_integers_record(config, interval),
             times=(round(settings.tolerance * _NS), round(settings.wait * _NS)),
             kernel=rtk_records.new_rtk_state(),
             integers=np.zeros(1, dtype=network_records.INTEGERS_STATE_DTYPE),
@@ -196,7 +204,19 @@ class NetworkAmbiguities:
             state.forget_base(newest - rtk.LATE_NS - state.times[0])
 
 
-def _float_record(config: NetworkSettings, gap_s: float) -> Array:
+def _growth(tau_s: float, interval_s: float) -> float:
+    """Deviation of white noise that averages as slowly as a correlated one of unit deviation.
+
+    The mean of many epochs of a first-order Gauss-Markov process has the variance of white
+    noise times (1 + f) / (1 - f), where f = exp(-interval / tau).
+    """
+    if not tau_s > 0.0:
+        return 1.0
+    fade = float(elementary.exp(-interval_s / tau_s))
+    return math.sqrt((1.0 + fade) / (1.0 - fade))
+
+
+def _float_record(config: NetworkSettings, gap_s: float, interval_s: float) -> Array:
     """Settings of the float filter as the record that the compiled loop reads."""
     settings = config.integers
     record = np.zeros(1, dtype=rtk_records.RTK_CONFIG_DTYPE)
@@ -204,7 +224,8 @@ def _float_record(config: NetworkSettings, gap_s: float) -> Array:
         values = getattr(settings, name)
         if len(values) not in (1, SLOTS):
             raise ConfigurationError(f"integers.{name} has {SLOTS} numbers or one")
-        record[name] = values
+        scale = _growth(getattr(settings, name.replace("sigma", "correlation")), interval_s)
+        record[name] = scale * np.array(values)
     record["mask"] = config.gnss.mask
     record["cn0_mask"] = config.gnss.cn0_mask
     record["excluded"] = excluded_satellites(config.gnss)
@@ -227,12 +248,13 @@ def _float_record(config: NetworkSettings, gap_s: float) -> Array:
     return record
 
 
-def _integers_record(config: NetworkSettings) -> Array:
+def _integers_record(config: NetworkSettings, interval_s: float) -> Array:
     settings = config.integers
     record = np.zeros(1, dtype=network_records.INTEGERS_CONFIG_DTYPE)
     for name in ("threshold", "success", "mask", "lock", "confirm", "doubt"):
         record[name] = getattr(settings, name)
     record["test"] = _TESTS[settings.test]
+    record["phase_scale"] = _growth(settings.phase_correlation, interval_s)
     record["least"] = _LEAST
     return record
 

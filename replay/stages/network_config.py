@@ -29,6 +29,9 @@ class Integers(Section, frozen=True):
     phase_sigma: tuple[
         Annotated[float, quantity("m", "of one receiver in the zenith, by signal slot")], ...
     ] = (0.005,)
+    # Multipath: epochs that come closer to each other tell less than they seem to.
+    code_correlation: Annotated[float, quantity("s", "of the codes' errors")] = 6.0
+    phase_correlation: Annotated[float, quantity("s", "of the phases' errors")] = 2.0
     weighting: Weighting = "sum"
     ionosphere_sigma: Annotated[float, quantity("1", "slant, m per m of baseline")] = 4e-6
     ionosphere_noise: Annotated[float, quantity("1", "walk in 1 s, m per m of baseline")] = 1e-7

@@ -50,7 +50,13 @@ from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
 from replay.stages.spp_config import WEIGHTINGS
-from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, HeldEpochs, longest_gap
+from replay.stages.waiting import (
+    EPOCH_READS,
+    EPOCH_TYPES,
+    HeldEpochs,
+    longest_gap,
+    nominal_interval,
+)
 
 Array = np.ndarray[Any, Any]
 
@@ -274,7 +280,11 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array, context: Context
     for name in motion.__struct_fields__:
         if name not in ("dynamics", "ionosphere", "troposphere"):
             record[name] = getattr(motion, name)
-    record["gap"] = longest_gap(motion.gap, context, Port(channels.GNSS_OBS))
+    network = getattr(config, "interpolation", None)
+    if network is not None and getattr(config, "mode", "") == "network":
+        # A satellite that the network says nothing of has all of its errors.
+        record["baseline_noise"] = max(differences.baseline_noise, network.slope)
+    record["gap"] = longest_gap(motion.gap, nominal_interval(context, Port(channels.GNSS_OBS)))
     record["dynamics"] = _DYNAMICS.index(motion.dynamics)
     record["ionosphere"] = int(motion.ionosphere)
     record["troposphere"] = int(motion.troposphere)

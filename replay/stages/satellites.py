@@ -14,6 +14,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
+from replay.gnss.antennas import ANTENNA_TYPES, Antennas
 from replay.gnss.ephemerides import ephemeris_records
 from replay.gnss.measurements import (
     SATELLITE_NAMES,
@@ -23,9 +24,10 @@ from replay.gnss.measurements import (
     select_signals,
     signal_names,
 )
-from replay.kernels import sights
+from replay.kernels import antenna_pattern, sights
+from replay.kernels.earth import enu_axes
 from replay.kernels.ephemeris import EPHEMERIS_DTYPE
-from replay.kernels.gnss_records import COUNT, FIRST, SATELLITES, SYSTEM_LETTERS
+from replay.kernels.gnss_records import COUNT, FIRST, SATELLITES, SLOTS, SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.log.columns import Columns
@@ -67,15 +69,26 @@ class SatellitesState:
     models: Array
     messages: Array
     available: Array
+    calibrated: bool
+    level: bool
+    antennas: Antennas
 
 
 class Satellites:
-    """The stage `satellites`, for the rover or for the base.
+    """The stage `satellites`, for the rover, the base or a station of a network.
 
     Parameters
     ----------
     role : str
-        RECEIVER computes its own coarse position; BASE stands at a known one.
+        RECEIVER computes its own coarse position; the others stand at a known one.
+
+    Notes
+    -----
+    Where the log has calibrations of the receiver's antenna, what it adds to code and phase
+    is one of the corrections. Antennas of stations that stand still are mounted with their
+    mark to the north, so that offset and pattern are used whole. Where the mark of the
+    rover's antenna points is not known: of its offset only the height is used, and the mean
+    of its pattern over azimuths.
     """
 
     def __init__(self, role: str = RECEIVER) -> None:
@@ -89,6 +102,7 @@ class Satellites:
                 Port(channels.NAV),
                 Port(channels.NAV_IONOSPHERE, optional=True),
                 Port(channels.RECEIVER, role, optional=True),
+                Port(channels.ANTENNAS, optional=True),
             ),
             outputs=(
                 Port(channels.SATELLITES, role),
@@ -104,9 +118,9 @@ class Satellites:
         if not isinstance(config, GnssConfig):
             raise TypeError("satellites takes a GnssConfig")
         record = _config_record(config)
-        if self.role == BASE:
+        if self.role != RECEIVER:
             record["fixed"] = 1
-            record["position"] = base_position(config, context)
+            record["position"] = station_position(config, context, self.role)
         return SatellitesState(
             selection=select_signals(config.gnss.signals, config.gnss.systems),
             config=record,
@@ -115,6 +129,9 @@ class Satellites:
             models=np.zeros(0, dtype=sights.IONOSPHERE_DTYPE),
             messages=np.zeros(0, dtype=EPHEMERIS_DTYPE),
             available=np.zeros(0, dtype=np.int64),
+            calibrated=config.antenna.calibrated,
+            level=self.role == RECEIVER,
+            antennas=Antennas(),
         )
 
     def step(self, state: SatellitesState, block: Block) -> tuple[SatellitesState, Outputs]:
@@ -135,7 +152,7 @@ class Satellites:
         outputs: Outputs = {}
         columns = {
             channels.SATELLITES: _sight_columns(found),
-            channels.CORRECTIONS: _correction_columns(found),
+            channels.CORRECTIONS: _correction_columns(found, _antenna_m(state, found)),
             channels.COARSE: _coarse_columns(found.epochs),
             channels.GNSS_EVENTS: event_columns(notes[: counts[0]], EVENT_TEXT),
         }
@@ -156,6 +173,7 @@ class Satellites:
                 "models": state.models,
                 "messages": state.messages,
                 "available": state.available,
+                **state.antennas.arrays(),
             }
         )
 
@@ -168,6 +186,7 @@ class Satellites:
                 "models": sights.IONOSPHERE_DTYPE,
                 "messages": EPHEMERIS_DTYPE,
                 "available": np.dtype(np.int64),
+                **ANTENNA_TYPES,
             },
         )
         return dataclasses.replace(
@@ -176,10 +195,10 @@ class Satellites:
             models=arrays["models"],
             messages=arrays["messages"],
             available=arrays["available"],
+            antennas=Antennas.of_arrays(arrays),
         )
 
-    @staticmethod
-    def _learn(state: SatellitesState, block: Block) -> None:
+    def _learn(self, state: SatellitesState, block: Block) -> None:
         """Keep the messages of a block; each is used from its log time on."""
         nav = block.get(channels.NAV.name)
         if nav is not None:
@@ -188,6 +207,24 @@ class Satellites:
         models = block.get(channels.NAV_IONOSPHERE.name)
         if models is not None:
             state.models = np.concatenate([state.models, _ionosphere_records(models)])
+        calibrations = block.get(channels.ANTENNAS.name)
+        if calibrations is not None:
+            state.antennas.learn(calibrations)
+        info = block.get(Port(channels.RECEIVER, self.role).name)
+        if info is not None:
+            state.antennas.wear(info)
+
+
+def _antenna_m(state: SatellitesState, found: Epochs) -> Array:
+    """What the antenna adds to each signal, `(rows, SLOTS)`, m; NaN where not modelled."""
+    added = np.full((len(found.rows), SLOTS), np.nan)
+    antennas = state.antennas
+    if state.calibrated and antennas.known:
+        antenna_pattern.model_antenna(
+            found.epochs, found.rows, antennas.worn, antennas.patterns, antennas.values,
+            state.level, added,
+        )  # fmt: skip
+    return added
 
 
 def _ionosphere_records(models: Columns) -> Array:
@@ -203,30 +240,42 @@ def _ionosphere_records(models: Columns) -> Array:
     return np.array(rows, dtype=sights.IONOSPHERE_DTYPE)
 
 
-def base_position(config: GnssConfig, context: Context) -> tuple[float, ...]:
-    """ECEF position of the base's antenna (m).
+def station_position(config: GnssConfig, context: Context, role: str) -> tuple[float, ...]:
+    """ECEF position (m) of the antenna of a receiver that stands still.
+
+    For the base that of the configuration, else what the receiver's header says: the marker's
+    position and the antenna's offset from it.
 
     Raises
     ------
     ConfigurationError
         Where neither the configuration nor the log has one.
     """
-    given = config.antenna.base_position
+    given = config.antenna.base_position if role == BASE else ()
     if given:
         if len(given) != 3:
             raise ConfigurationError(
                 f"antenna.base_position has {len(given)} numbers", mend="give x, y, z in ECEF"
             )
         return given
-    port = Port(channels.RECEIVER, BASE)
+    port = Port(channels.RECEIVER, role)
     info = context.heads.get(port.name)
     if info is not None and len(info) and info.is_present("approximate_position_ecef_m")[0]:
-        position = info["approximate_position_ecef_m"][0]
-        return tuple(float(value) for value in position)
+        x, y, z = info["approximate_position_ecef_m"][0].tolist()
+        if info.is_present("antenna_offset_enu_m")[0]:
+            offset = info["antenna_offset_enu_m"][0].tolist()
+            axes = np.zeros((3, 3))
+            enu_axes(x, y, z, axes)
+            x, y, z = (
+                value + sum(axes[k, place] * offset[k] for k in range(3))
+                for place, value in enumerate((x, y, z))
+            )
+        return x, y, z
+    mend = "" if role != BASE else "--set antenna.base_position=[X, Y, Z], ECEF in m"
     raise ConfigurationError(
-        "the position of the base is not known",
+        f"the position of the {role} is not known",
         where=f"{context.topics.get(port.name, 'no channel ' + port.channel.topic)}",
-        mend="--set antenna.base_position=[X, Y, Z], ECEF in m",
+        mend=mend or "leave the station out, or give its log a position",
     )
 
 
@@ -308,7 +357,7 @@ def _coarse_columns(epochs: Array) -> Columns:
     )
 
 
-def _correction_columns(found: Epochs) -> Columns:
+def _correction_columns(found: Epochs, antenna: Array) -> Columns:
     epoch = np.repeat(np.arange(len(found.epochs)), found.epochs["count"])
     used = (found.rows["signal"] != 0) & (found.rows["seen"] == 1)[:, None]
     row, slot = np.nonzero(used)
@@ -331,7 +380,11 @@ def _correction_columns(found: Epochs) -> Columns:
             "hydrostatic_mapping": np.ascontiguousarray(rows["hydrostatic_mapping"]),
             "wet_mapping": np.ascontiguousarray(rows["wet_mapping"]),
             "shapiro_m": np.ascontiguousarray(rows["shapiro"]),
+            "antenna_m": antenna[row, slot],
         },
         log_time_ns=at["log_t"],
-        present={"shapiro_m": np.ascontiguousarray(rows["shapiro"] != 0.0)},
+        present={
+            "shapiro_m": np.ascontiguousarray(rows["shapiro"] != 0.0),
+            "antenna_m": np.isfinite(antenna[row, slot]),
+        },
     )

@@ -145,13 +145,16 @@ EPOCH_TYPES: Final[dict[str, np.dtype[Any]]] = {
 """Of the fields of :class:`HeldEpochs`, for dumps."""
 
 
-def longest_gap(least_s: float, context: Context, observations: Port) -> float:
-    """Seconds without a phase that end its ambiguity: what is set, and two missing epochs."""
+def nominal_interval(context: Context, observations: Port) -> float:
+    """Seconds between a receiver's epochs, as its first rows tell; 1 where they do not."""
     rows = context.heads.get(observations.name)
-    times = np.unique(rows.valid_time_ns) if rows is not None else np.zeros(0)
-    if len(times) < 2:
-        return least_s
-    return max(least_s, _INTERVALS * float(np.diff(times).min()) / _NS)
+    times = np.unique(rows.valid_time_ns) if rows is not None else np.zeros(0, dtype=np.int64)
+    return float(np.diff(times).min()) / _NS if len(times) > 1 else 1.0
+
+
+def longest_gap(least_s: float, interval_s: float) -> float:
+    """Seconds without a phase that end its ambiguity: what is set, and two missing epochs."""
+    return max(least_s, _INTERVALS * interval_s)
 
 
 def read_epochs(block: Block, selection: Selection, role: str = RECEIVER) -> Epochs | None:

@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 from replay.evaluate.geometry import Floats
 from replay.time import to_datetime64
 from replay.view.labels import SIGMA, TIMES
+from replay.view.network_scene import Stations
 from replay.view.panels import Panel, Section
 from replay.view.scene import ELLIPSOID_SIGMAS, Scene
 from replay.view.sink import TIMELINE, entity
@@ -26,6 +27,8 @@ RAW: Final = "Raw"
 SATELLITES: Final = "Satellites"
 AMBIGUITIES: Final = "Ambiguities"
 CORRECTIONS: Final = "Corrections"
+NETWORK: Final = "Network"
+NETWORK_ERRORS: Final = "Network errors"
 ABOUT: Final = "About"
 
 _MOTION_SECTIONS: Final = (
@@ -66,6 +69,8 @@ class Contents:
     run_count : int
     span_ns : (int, int) or None, GPS ns
         First and last time, so that plots open with the whole run.
+    stations : Stations or None
+        Reference stations that were drawn on map and plan.
     """
 
     panels: Sequence[Panel]
@@ -75,6 +80,7 @@ class Contents:
     has_states: bool
     run_count: int
     span_ns: tuple[int, int] | None
+    stations: Stations | None = None
 
 
 def make_blueprint(contents: Contents, *, active_tab: str | None = None) -> rrb.Blueprint:
@@ -94,6 +100,8 @@ def make_blueprint(contents: Contents, *, active_tab: str | None = None) -> rrb.
         (AMBIGUITIES, _rows(contents, (Section.AMBIGUITIES,))),
         (INNOVATIONS, _rows(contents, (Section.INNOVATIONS, Section.NIS, Section.RESIDUALS))),
         (CORRECTIONS, _rows(contents, (Section.CORRECTIONS,))),
+        (NETWORK, _network(contents)),
+        (NETWORK_ERRORS, _rows(contents, (Section.NETWORK_ERRORS,))),
         (RAW, _raw(contents)),
         (ABOUT, [rrb.TextDocumentView(origin="/about", name="About this recording")]),
     ]
@@ -197,6 +205,41 @@ def _overview(contents: Contents) -> list[Part]:
     return (
         [rrb.Vertical(*parts, row_shares=_shares(len(parts), contents.run_count))] if parts else []
     )
+
+
+def _network(contents: Contents) -> list[Part]:
+    """Map and plan with the stations, then the corrections."""
+    parts: list[Part] = []
+    if contents.stations is not None and contents.scene is not None:
+        parts.append(rrb.Horizontal(*station_views(contents.stations, contents.scene)))
+    return parts + _rows(contents, (Section.NETWORK_CORRECTIONS,))
+
+
+def station_views(stations: Stations, scene: Scene) -> list[rrb.View]:
+    """Map and plan that hold the paths and all stations."""
+    east, north, _ = np.maximum(stations.high_m - stations.low_m, _SMALLEST_PLAN_M)
+    spacing = 10.0 ** np.floor(np.log10(max(east, north) / 2.0))
+    return [
+        rrb.MapView(
+            origin="/map",
+            name="Stations and paths, map",
+            zoom=_map_zoom(east, north, scene, _MAP_HEIGHT),
+        ),
+        rrb.Spatial3DView(
+            origin="/world",
+            contents=["$origin/**", *(f"- /{entity(body)}/**" for body in scene.bodies)],
+            name=f"Stations and paths, local east-north-up [m], north up, grid {spacing:g} m",
+            line_grid=rrb.LineGrid3D(visible=True, spacing=spacing),
+            eye_controls=plan_eye(stations.low_m, stations.high_m),
+        ),
+    ]
+
+
+def panel_rows(panels: Sequence[Panel], span_ns: tuple[int, int] | None) -> list[Part]:
+    """Views of panels, those of one section and row beside each other."""
+    contents = Contents(panels, None, (), has_events=False, has_states=False, run_count=1,
+                        span_ns=span_ns)  # fmt: skip
+    return _rows(contents, list(dict.fromkeys(panel.section for panel in panels)))
 
 
 def _shares(count: int, runs: int) -> list[float]:

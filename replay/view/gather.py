@@ -32,6 +32,10 @@ KEPT = (
     channels.GNSS_EVENTS,
     channels.SLIPS,
     channels.DISPLACEMENT,
+    channels.RECEIVER,
+    channels.NETWORK_RESIDUALS,
+    channels.NETWORK_ERRORS,
+    channels.NETWORK_CORRECTIONS,
     channels.FILTER_STATE,
     channels.FILTER_INNOVATIONS,
     channels.FILTER_CLOCKS,
@@ -102,6 +106,11 @@ class RunData:
     fixes, observations : mapping of receiver to Columns
     satellites, corrections, slips, displacements, gnss_events : mapping of receiver to Columns
         What stages said of a receiver's satellites.
+    receivers : mapping of receiver to Columns
+        What is stated of receivers.
+    network_residuals, network_errors : mapping of baseline to Columns
+        Between reference stations, as found and as filtered.
+    network_corrections : mapping of rover to Columns
     runs : tuple of Run
         In the order of their names.
     stats : mapping of topic to ChannelStats
@@ -123,6 +132,10 @@ class RunData:
     slips: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
     displacements: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
     gnss_events: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    receivers: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    network_residuals: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    network_errors: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
+    network_corrections: Mapping[str, Columns] = dataclasses.field(default_factory=dict)
 
     @property
     def span_ns(self) -> tuple[int, int] | None:
@@ -197,6 +210,10 @@ def gather(
         slips=_by_part(whole, channels.SLIPS, "receiver"),
         displacements=_by_part(whole, channels.DISPLACEMENT, "receiver"),
         gnss_events=_by_part(whole, channels.GNSS_EVENTS, "receiver"),
+        receivers=_by_part(whole, channels.RECEIVER, "receiver"),
+        network_residuals=_by_part(whole, channels.NETWORK_RESIDUALS, "baseline"),
+        network_errors=_by_part(whole, channels.NETWORK_ERRORS, "baseline"),
+        network_corrections=_by_part(whole, channels.NETWORK_CORRECTIONS, "rover"),
     )
 
 

@@ -53,6 +53,8 @@ class Section(enum.Enum):
     RESIDUALS = "Residuals per satellite"
     SLIPS = "Cycle slips"
     CORRECTIONS = "Corrections per satellite"
+    NETWORK_ERRORS = "Errors between reference stations"
+    NETWORK_CORRECTIONS = "Network corrections"
     INNOVATIONS = "Innovations"
     NIS = "Normalised innovation squared"
     GNSS = "GNSS"

@@ -26,6 +26,8 @@ from replay.view.gather import Batches, RunData, gather
 from replay.view.geometry_panels import geometry_panels
 from replay.view.gnss_panels import gnss_panels
 from replay.view.navigation_panels import navigation_panels
+from replay.view.network_panels import network_panels
+from replay.view.network_scene import draw_stations
 from replay.view.palette import AXES
 from replay.view.panels import Panel
 from replay.view.satellite_panels import satellite_panels
@@ -117,6 +119,7 @@ def record(
             has_states=bool(draw_states(sink, data)),
             run_count=len(data.runs),
             span_ns=data.span_ns,
+            stations=draw_stations(sink, data, scene),
         )
         _draw_about(sink, data, scene)
         sink.recording.send_blueprint(make_blueprint(contents, active_tab=chosen.active_tab))
@@ -130,6 +133,7 @@ def all_panels(data: RunData) -> list[Panel]:
         *geometry_panels(data),
         *innovation_panels(data),
         *satellite_panels(data),
+        *network_panels(data),
         *gnss_panels(data),
     ]
 

@@ -90,6 +90,11 @@ _GROUPS: Final = (
         (Section.CORRECTIONS,),
         "Terms between range and pseudorange, as they add to the pseudorange.",
     ),
+    (
+        "Network of reference stations",
+        (Section.NETWORK_CORRECTIONS, Section.NETWORK_ERRORS),
+        "Corrections of the rover's phases, then errors between stations: as found and filtered.",
+    ),
     ("GNSS", (Section.GNSS,), "What the receivers state."),
     ("Inertial samples", (Section.IMU,), "Least and greatest sample of each second."),
 )
