@@ -11,6 +11,7 @@ import numpy as np
 
 from replay.channels import GNSS_FIX, GNSS_OBS, IMU, NAV, RECEIVER, ChannelSpec
 from replay.engine.job import make_job
+from replay.engine.manifest import DEFAULTS
 from replay.engine.pipelines import PIPELINES, find_pipeline
 from replay.engine.run import replay_log
 from replay.gnss.ephemerides import ephemeris_columns
@@ -51,12 +52,13 @@ def _write_small_log(path: Path) -> None:
         GNSS_FIX.at(receiver="rover"): (GNSS_FIX, _fixes(times)),
         NAV.topic: (NAV, _messages()),
     }
-    for receiver in ("rover", "base"):
+    for receiver in ("rover", "base", "station"):
         rows[GNSS_OBS.at(receiver=receiver)] = (GNSS_OBS, _observations(times))
         rows[RECEIVER.at(receiver=receiver)] = (RECEIVER, _receiver(times[:1]))
     with LogWriter(path) as writer:
         for topic, (spec, _) in rows.items():
             writer.add_channel(topic, spec.message)
+        writer.add_metadata(DEFAULTS, {"toml": '[gnss]\nreceiver = "rover"\nbase = "base"\n'})
         writer.write({topic: columns for topic, (_, columns) in rows.items()})
 
 

@@ -64,7 +64,7 @@ class Errors(Section, frozen=True):
     acceleration_sigma: Annotated[float, quantity("m/s^2", "before the first residual")] = 1e-6
     acceleration_noise: Annotated[
         float, quantity("1", "m/s^2 in sqrt(s), walk of the acceleration")
-    ] = 2e-7
+    ] = 4e-6
     # Less than `integers.phase_sigma`, which is of multipath and noise together.
     multipath_sigma: Annotated[float, quantity("m", "of one receiver in the zenith")] = 0.004
     multipath_tau: Annotated[float, quantity("s", "its correlation time")] = 30.0
