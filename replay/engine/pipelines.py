@@ -151,6 +151,17 @@ def _network_ins_tc() -> Parts:
     return NetworkInsConfig, stages
 
 
+def _network_virtual() -> Parts:
+    from replay.stages.network import network_stages
+    from replay.stages.network_config import NetworkConfig
+    from replay.stages.network_virtual import NetworkVirtual
+
+    def stages(config: NetworkConfig, topics: Collection[str]) -> Stages:
+        return (*network_stages(config, topics), NetworkVirtual())
+
+    return NetworkConfig, stages
+
+
 _ALL: Final = (
     Pipeline(
         "gnss-ins-lc",
@@ -206,6 +217,11 @@ _ALL: Final = (
         "network-ins-tc",
         "tightly coupled RTK/INS with corrections from a network of reference stations",
         _network_ins_tc,
+    ),
+    Pipeline(
+        "network-virtual",
+        "a virtual reference station near the rover, from a network of reference stations",
+        _network_virtual,
     ),
     Pipeline(
         "moving-base",

@@ -62,6 +62,7 @@ _COMMON: Final = (
     "hydrostatic_m",
     "wet_m",
 )
+_WHERE_MODELLED: Final = ("shapiro_m", "antenna_m")
 _TYPES: Final[dict[str, np.dtype[Any]]] = {
     "place": np.dtype(np.float64),
     "since": np.dtype(np.int64),
@@ -242,7 +243,11 @@ def _match(wanted: Array, rows: Array) -> Array:
 def _modelled(columns: Columns) -> tuple[Array, Array, Array]:
     """Names of rows, all that is modelled but the ionosphere (m), and the ionosphere (m)."""
     rows, columns = named_rows(columns)
-    total = np.where(columns.is_present("shapiro_m"), columns["shapiro_m"], 0.0)
+    # The antenna is the master's alone: a station that is not there has none.
+    total = np.zeros(len(rows))
+    for name in _WHERE_MODELLED:
+        if name in columns.values:
+            total = total + np.where(columns.is_present(name), columns[name], 0.0)
     for name in _COMMON:
         total = total + columns[name]
     return rows, total, columns["ionosphere_m"].astype(np.float64)

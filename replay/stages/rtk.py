@@ -94,7 +94,7 @@ class Rtk:
         network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
         self.spec = StageSpec(
             name="rtk",
-            version=1,
+            version=2,
             inputs=(
                 *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
                 *network,

@@ -85,7 +85,7 @@ class RtkInertial:
         network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
         self.spec = StageSpec(
             name="rtk-ins-tc",
-            version=1,
+            version=2,
             inputs=(
                 Port(channels.IMU),
                 *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),

@@ -14,7 +14,7 @@ from replay.kernels.network_records import (
     EVENT_STATION_LOST,
 )
 from replay.stages.base import BASE, Context, Port
-from replay.stages.network_ambiguities import NetworkAmbiguities
+from replay.stages.network_ambiguities import NetworkAmbiguities, _growth
 from replay.stages.network_config import NetworkConfig
 from tests.stages.test_rtk import cut, integers
 from tests.stages.two_receivers import (
@@ -41,9 +41,11 @@ def wavelength(signal):
     return C_M_S / FREQUENCY[signal]
 
 
-def settings(**integers_section):
+def settings(**own):
+    """Settings for noise that is white."""
+    white = {"code_correlation": 0.0, "phase_correlation": 0.0}
     return configuration.build(
-        NetworkConfig, [{"gnss": {"base": "master"}, "integers": integers_section}]
+        NetworkConfig, [{"gnss": {"base": "master"}, "integers": {**white, **own}}]
     )
 
 
@@ -207,6 +209,17 @@ def test_a_wrong_integer_is_repaired_and_told():
     assert events["value"][repaired][0] == -1.0
     assert events.valid_time_ns[repaired][0] == half + 4 * NS
     assert assert_right([outputs], truth, since=half + 5 * NS) > 0
+
+
+def test_correlated_errors_take_longer_to_average():
+    """The deviation that the filter takes is that of the mean of an AR(1) process."""
+    tau, interval, count = 6.0, 1.0, 4000
+    fade = np.exp(-interval / tau)
+    lags = np.arange(1, count)
+    variance_of_mean = (1.0 + 2.0 * np.sum((1.0 - lags / count) * fade**lags)) / count
+    assert _growth(tau, interval) == pytest.approx(np.sqrt(variance_of_mean * count), rel=1e-3)
+    assert _growth(0.0, interval) == 1.0
+    assert _growth(6.0, 30.0) == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_station_that_stays_away_is_told_and_taken_up_again():

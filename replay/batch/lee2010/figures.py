@@ -8,30 +8,19 @@ from typing import Final
 
 import numpy as np
 
-from replay.evaluate.network_run import (
-    NetworkRun,
-    double_residuals,
-    ordered,
-    settled_ns,
-    solution_errors,
-)
+from replay.batch.lee2010.picture import Filtered, RunPicture
 from replay.evaluate.signal_table import labels
-from replay.log.columns import Columns
 from replay.view.network_panels import (
     correction_panels,
     impact_panels,
     residual_panels,
     satellite_inks,
-    satellites_of,
     shifted,
     state_panels,
 )
 from replay.view.network_solution import difference_panels, navigation_parameter_panels
 from replay.view.palette import Ink, run_ink
 from replay.view.panels import Panel
-
-# The satellite of the paper's figures 5 and 6.
-_FAVOURITE: Final = "G08"
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -43,27 +32,27 @@ class CaseRuns:
     label : str
         "case1".
     title : str
-    runs : mapping of mode to NetworkRun
+    runs : mapping of mode to RunPicture
     """
 
     label: str
     title: str
-    runs: Mapping[str, NetworkRun]
+    runs: Mapping[str, RunPicture]
 
     @property
-    def any_run(self) -> NetworkRun:
+    def any_run(self) -> RunPicture:
         """The run in network mode, else another."""
         return self.runs.get("network") or next(iter(self.runs.values()))
 
     @property
     def start_ns(self) -> int:
         """First solution of all runs, GPS ns."""
-        return min(int(run.data.solution.valid_time_ns.min()) for run in self.runs.values())
+        return min(int(run.solution.valid_time_ns.min()) for run in self.runs.values())
 
     @property
     def end_ns(self) -> int:
         """Last solution of all runs, GPS ns."""
-        return max(int(run.data.solution.valid_time_ns.max()) for run in self.runs.values())
+        return max(int(run.solution.valid_time_ns.max()) for run in self.runs.values())
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -107,12 +96,8 @@ def span_of(cases: Sequence[CaseRuns]) -> tuple[int, int]:
 
 
 def _inks(cases: Sequence[CaseRuns]) -> dict[str, Ink]:
-    known: list[Columns] = []
-    for case in cases:
-        for run in case.runs.values():
-            known += [*run.errors.values()]
-            known += [c for c in (run.corrections, run.ambiguities) if c is not None]
-    return satellite_inks(satellites_of(*known)) if known else {}
+    names = {name for case in cases for run in case.runs.values() for name in run.satellites}
+    return satellite_inks(sorted(names))
 
 
 def _moved(panels: Sequence[Panel], case: CaseRuns, cases: Sequence[CaseRuns]) -> list[Panel]:
@@ -122,20 +107,18 @@ def _moved(panels: Sequence[Panel], case: CaseRuns, cases: Sequence[CaseRuns]) -
 
 def _filter_figures(case: CaseRuns) -> list[FigureOfPaper]:
     """Figures 5 and 6: one satellite of the first baseline."""
-    run = case.any_run
-    baseline = next((name for name in run.errors if name in run.residuals), None)
-    if baseline is None:
+    chosen = case.any_run.filtered
+    if chosen is None:
         return []
-    errors, residuals = run.errors[baseline], run.residuals[baseline]
-    satellite = _chosen_satellite(errors)
+    errors, residuals, satellite = chosen.errors, chosen.residuals, chosen.satellite
     signals = sorted({s.decode() for s in np.unique(labels(errors, "signal")).tolist()})
     states = [
         item
         for signal in signals
         for item in state_panels(errors, satellite, signal, run_ink(0), key="figure5")
     ]
-    where = f"{satellite}, baseline {baseline}, {case.title.lower()}"
-    references = _references(errors, satellite)
+    where = f"{satellite}, baseline {chosen.baseline}, {case.title.lower()}"
+    references = _references(chosen)
     return [
         FigureOfPaper(
             5, f"States of the filter of baseline errors: {where}",
@@ -154,17 +137,8 @@ def _filter_figures(case: CaseRuns) -> list[FigureOfPaper]:
     ]  # fmt: skip
 
 
-def _chosen_satellite(errors: Columns) -> str:
-    """The paper's where it is seen for half of the time, else the one seen longest."""
-    names, counts = np.unique(labels(errors, "satellite"), return_counts=True)
-    seen = {name.decode(): int(n) for name, n in zip(names.tolist(), counts, strict=True)}
-    longest = max(seen, key=lambda name: (seen[name], name))
-    return _FAVOURITE if 2 * seen.get(_FAVOURITE, 0) >= seen[longest] else longest
-
-
-def _references(errors: Columns, satellite: str) -> str:
-    of = labels(errors, "satellite") == satellite.encode()
-    names = labels(errors, "reference")[of]
+def _references(chosen: Filtered) -> str:
+    names = labels(chosen.errors, "reference")
     return ", ".join(name.decode() for name in dict.fromkeys(names.tolist()))
 
 
@@ -188,7 +162,7 @@ def _corrections(cases: Sequence[CaseRuns], inks: Mapping[str, Ink]) -> FigureOf
 def _residuals(cases: Sequence[CaseRuns], inks: Mapping[str, Ink]) -> FigureOfPaper:
     panels: list[Panel] = []
     for case in cases:
-        residuals = double_residuals(case.any_run)
+        residuals = case.any_run.residuals
         if residuals is not None:
             found = residual_panels(residuals, inks, key=f"figure8/{case.label}", title=case.title)
             for pair in found.values():
@@ -202,21 +176,17 @@ def _residuals(cases: Sequence[CaseRuns], inks: Mapping[str, Ink]) -> FigureOfPa
 
 
 def _navigation(case: CaseRuns) -> FigureOfPaper:
-    solution = ordered(case.any_run.data.solution)
     return FigureOfPaper(
         9, f"Navigation parameters, {case.title.lower()}",
         "Estimates in network mode: position from the first solution, velocity, attitude.",
-        tuple(navigation_parameter_panels(solution, key="figure9")), 3,
+        tuple(navigation_parameter_panels(case.any_run.solution, key="figure9")), 3,
     )  # fmt: skip
 
 
 def _differences(cases: Sequence[CaseRuns]) -> FigureOfPaper:
     panels: list[Panel] = []
     for case in cases:
-        errors = {
-            mode: solution_errors(run, settled_ns(run.data.solution))[0]
-            for mode, run in case.runs.items()
-        }
+        errors = {mode: run.differences for mode, run in case.runs.items()}
         found = difference_panels(errors, key=f"figure10/{case.label}", title=case.title)
         panels += _moved(found, case, cases)
     return FigureOfPaper(

@@ -92,7 +92,7 @@ def _paths(runs: Sequence[CaseRuns]) -> RunData:
     """The solutions of all cases, each under its title, thinned to a row a second."""
     found: list[Run] = []
     for case in runs:
-        solution = case.any_run.data.solution
+        solution = case.any_run.solution
         seconds = solution.valid_time_ns // 1_000_000_000
         first = np.flatnonzero(np.append(True, np.diff(seconds) > 0))
         kept = solution.take(first)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -72,14 +73,12 @@ def _headline(cases: Cases) -> Iterator[tuple[str, str, str]]:
 
 def stations_of(runs: Sequence[CaseRuns]) -> dict[str, Floats]:
     """Positions of the stations, the master first."""
-    run = runs[0].any_run
-    names = sorted(run.stations, key=lambda name: (name != run.master, name))
-    return {name: run.stations[name] for name in names}
+    return runs[0].any_run.stations
 
 
 def tracks_of(runs: Sequence[CaseRuns]) -> list[Track]:
     """True paths of the cases."""
-    return [Track.of(case.title, case.any_run.data.truth) for case in runs]
+    return [dataclasses.replace(case.any_run.track, name=case.title) for case in runs]
 
 
 def _places(runs: Sequence[CaseRuns]) -> str:
@@ -155,7 +154,7 @@ def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, str]]
 
 def _configuration(runs: Sequence[CaseRuns]) -> str:
     """Settings of the first case's run in network mode, as its manifest has them."""
-    metadata = runs[0].any_run.data.metadata
+    metadata = runs[0].any_run.metadata
     if MANIFEST not in metadata:
         return ""
     text = read_manifest(metadata, runs[0].title).configuration
