@@ -329,7 +329,9 @@ def _whole(begun: _Begun) -> Done:
         begun.logs,
         {name: begun.found[name].measured.figures for name in names},
         tuple(
-            f"{member.folder}, {name}: {loss}" for name in names for loss in begun.found[name].losses
+            f"{member.folder}, {name}: {loss}"
+            for name in names
+            for loss in begun.found[name].losses
         ),
         begun.elapsed_s,
         {name: begun.found[name].measured.picture for name in names} if first else {},

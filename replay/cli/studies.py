@@ -33,6 +33,7 @@ def study(
     """Simulate, run and measure the cases of a study; write its report and recording."""
     from replay.batch.study import STUDIES, Options, find_study, run_study
     from replay.batch.study import discard_logs as discard
+    from replay.batch.workers import Workers
 
     if name is None:
         table = Table("study", "what it does")
@@ -45,8 +46,10 @@ def study(
     found = find_study(name)
     labels = tuple(part.strip() for part in cases.split(",") if part.strip())
     options = Options(output, seeds, labels, jobs, not discard_logs)
-    done = run_study(found, options, told=_told)
-    for what, path in found.present(done, options).items():
+    with Workers(jobs) as workers:
+        done = run_study(found, options, workers=workers, told=_told)
+        files = found.present(done, options, workers)
+    for what, path in files.items():
         say(f"{what}: {path}")
     losses = [loss for member in done for loss in member.losses]
     for loss in losses:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any, Final
@@ -12,9 +12,10 @@ from typing import Any, Final
 from replay.batch.lee2010.figures import CaseRuns, FigureOfPaper, span_of
 from replay.batch.lee2010.published import TITLES
 from replay.batch.lee2010.tables import Cases, all_tables, mode_figures, seeds_said, span_said
+from replay.batch.workers import Workers
 from replay.engine.manifest import MANIFEST, read_manifest
 from replay.evaluate.geometry import Floats
-from replay.view.charts import Clock, panels_chart
+from replay.view.charts import Chart, Clock, panels_chart
 from replay.view.markup import Table, figure, page, section, tiles
 from replay.view.network_charts import Track, layout_chart, trajectory_chart
 
@@ -28,7 +29,12 @@ _LEFT_OUT: Final = ("segments",)
 
 
 def report_html(
-    cases: Cases, runs: Sequence[CaseRuns], figures: Sequence[FigureOfPaper], *, command: str
+    cases: Cases,
+    runs: Sequence[CaseRuns],
+    figures: Sequence[FigureOfPaper],
+    *,
+    command: str,
+    workers: Workers,
 ) -> str:
     """The page as text.
 
@@ -40,9 +46,11 @@ def report_html(
     figures : sequence of FigureOfPaper
     command : str
         That makes it again.
+    workers : Workers
+        They draw the charts.
     """
     made = all_tables(cases)
-    clock = Clock(*span_of(runs))
+    places, charts = _charts(runs, figures, workers)
     parts = [
         f"<h1>{escape(TITLE)}</h1><p class='sub'>{escape(_PAPER)}</p>",
         tiles(_headline(cases)),
@@ -53,8 +61,8 @@ def report_html(
                 *(f"<div class='dense'>{table.html()}</div>" for table in made),
             ],
         ),
-        _places(runs),
-        *(_section_of(item, clock) for item in figures),
+        places,
+        *(_section_of(item, chart) for item, chart in zip(figures, charts, strict=True)),
         _assumptions(cases, runs),
         section("How it was made", [f"<pre>{escape(command)}</pre>", _configuration(runs)]),
     ]
@@ -81,21 +89,38 @@ def tracks_of(runs: Sequence[CaseRuns]) -> list[Track]:
     return [dataclasses.replace(case.any_run.track, name=case.title) for case in runs]
 
 
-def _places(runs: Sequence[CaseRuns]) -> str:
+def _charts(
+    runs: Sequence[CaseRuns], figures: Sequence[FigureOfPaper], workers: Workers
+) -> tuple[str, list[Chart]]:
+    """Sections of the places, and a chart of each figure; drawn beside each other."""
     stations, tracks = stations_of(runs), tracks_of(runs)
-    parts = [figure(trajectory_chart(tracks), "Trajectories of the cases in space")]
-    layout = ""
+    clock = Clock(*span_of(runs))
+    first = sorted(range(len(figures)), key=lambda i: -len(figures[i].panels))
+    tasks: list[tuple[Callable[..., Chart], tuple[Any, ...]]]
+    tasks = [(_chart_of, (figures[i], clock)) for i in first]
+    tasks.append((trajectory_chart, (tracks,)))
     if stations:
-        chart = layout_chart(stations, tracks)
-        layout = section(
-            "Figure 3. Reference stations and test areas",
-            [figure(chart, "Plan of reference stations, baselines and paths")],
+        tasks.append((layout_chart, (stations, tracks)))
+    drawn = workers.call(tasks)
+    by_figure = dict(zip(first, drawn, strict=False))
+    others = drawn[len(first) :]
+    places = section(
+        "Figure 4. Trajectories", [figure(others[0], "Trajectories of the cases in space")]
+    )
+    if stations:
+        words = "Plan of reference stations, baselines and paths"
+        places = (
+            section("Figure 3. Reference stations and test areas", [figure(others[1], words)])
+            + places
         )
-    return layout + section("Figure 4. Trajectories", parts)
+    return places, [by_figure[i] for i in range(len(figures))]
 
 
-def _section_of(item: FigureOfPaper, clock: Clock) -> str:
-    chart = panels_chart(item.panels, clock, (), caption=item.caption, columns=item.columns)
+def _chart_of(item: FigureOfPaper, clock: Clock) -> Chart:
+    return panels_chart(item.panels, clock, (), caption=item.caption, columns=item.columns)
+
+
+def _section_of(item: FigureOfPaper, chart: Chart) -> str:
     names = ", ".join(panel.heading for panel in item.panels)
     return section(
         f"Figure {item.number}. {item.title}", [figure(chart, f"Plots over time: {names}")]
