@@ -244,7 +244,7 @@ def _modelled(columns: Columns) -> tuple[Array, Array, Array]:
     """Names of rows, all that is modelled but the ionosphere (m), and the ionosphere (m)."""
     rows, columns = named_rows(columns)
     # The antenna is the master's alone: a station that is not there has none.
-    total = np.zeros(len(rows))
+    total: Array = np.zeros(len(rows))
     for name in _WHERE_MODELLED:
         if name in columns.values:
             total = total + np.where(columns.is_present(name), columns[name], 0.0)
