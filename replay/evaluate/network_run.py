@@ -37,7 +37,7 @@ from replay.log.columns import Columns, concatenate
 from replay.log.reader import LogReader
 from replay.time import NS_PER_S
 
-SETTLING_S: Final = 60.0
+SETTLING_S: Final = 120.0
 _CM: Final = 100.0
 _ARC_MINUTES: Final = float(np.degrees(1.0) * 60.0)
 _NORTHWARD: Final = (("north", 1), ("east", 0), ("height", 2))
