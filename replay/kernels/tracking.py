@@ -165,6 +165,7 @@ def track(
     states: Array,
     losses: Array,
     clock: Array,
+    antenna: Array,
     signal: Array,
     normals: Array,
     uniforms: Array,
@@ -183,6 +184,8 @@ def track(
         Noise grows with them.
     clock : float64 array (e, 2)
         Receiver's bias (s) and drift (s/s).
+    antenna : float64 array (e, 2)
+        What it adds to code and phase (m), and the rate of that (m/s).
     signal : array (1,) of SIGNAL_DTYPE
     normals : float64 array (e, 6)
         The two of multipath are correlated in time, of unit variance.
@@ -233,6 +236,7 @@ def track(
         noisy = weight * exp(_DECIBEL * loss) if loss > 0.0 else weight
         b, b_rate = clock[k, 0], clock[k, 1]
         free = c * (b + sight["travel_s"] - sight["clock_s"]) + sight["neutral_m"]
+        free += antenna[k, 0]
         delay = s["ionosphere"] * sight["ionosphere_m"]
         code = free + delay + s["code_delay_m"]
         noise = s["code_sigma_m"] * noisy * n[CODE]
@@ -281,6 +285,7 @@ def track(
         pace = 1.0 - b_rate
         rate = c * (1.0 - (1.0 + sight["clock_drift"]) * (1.0 - sight["travel_rate"]) * pace)
         rate += pace * (sight["neutral_rate"] - s["ionosphere"] * sight["ionosphere_rate"])
+        rate += pace * antenna[k, 1]
         rate += s["rate_sigma_m_s"] * noisy * n[RATE]
         m["carrier"] = 1
         m["carrier_cycles"] = phase / s["wavelength_m"] + ambiguity

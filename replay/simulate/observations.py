@@ -23,10 +23,12 @@ from replay.kernels.tracking import MEASUREMENT_DTYPE, SIGNAL_DTYPE
 from replay.kernels.true_orbit import broadcast_errors
 from replay.log.columns import Columns, Ragged, concatenate
 from replay.simulate.air import ionosphere_message
+from replay.simulate.antennas import calibration_columns
 from replay.simulate.blockage import Surroundings, surroundings
 from replay.simulate.constellation import name_of, sends
 from replay.simulate.navigation import preferred
 from replay.simulate.noise import Floats, normals, uniforms
+from replay.simulate.phase_centres import PhaseCentres, worn_antennas
 from replay.simulate.signal_truth import signal_truth
 from replay.simulate.sky import Receiver, Setup
 from replay.simulate.truth import Epochs, Scene, TrueSky, make_epochs, make_sky, wander
@@ -42,7 +44,7 @@ _HOUR_S: Final = 3600.0
 
 
 def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, str]]:
-    """Channels of navigation data and of every receiver, and what was done to them.
+    """Channels of navigation data, antennas and of every receiver, and what was done to them.
 
     Returns
     -------
@@ -57,6 +59,9 @@ def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, s
             setup.sky.ionosphere, setup.sky.systems, scene.start_ns
         ),
     }
+    told = [antenna for antenna in worn_antennas(setup) if antenna.calibrated]
+    if told:
+        rows[channels.ANTENNAS.topic] = calibration_columns(told, scene.start_ns)
     slips: list[dict[str, Any]] = []
     arcs: list[list[Any]] = []
     for receiver in setup.receivers:
@@ -112,6 +117,7 @@ class _Part:
         self.setup, self.scene, self.sky = setup, scene, sky
         self.receiver, self.epochs = receiver, epochs
         self.around = around
+        self.centres = PhaseCentres(receiver, setup, scene, epochs)
         self.slips: list[dict[str, Any]] = []
         self.arcs: list[list[Any]] = []
         self.terms: Columns | None = None  # filled by `measure` where they are asked for
@@ -141,7 +147,11 @@ class _Part:
             for signal in sorted(self.receiver.signals):
                 if signal[0] == name[0] and sends(self.sky.broadcast[number], signal[1:]):
                     settings = self._settings(number, signal)
-                    table = self._signal(name, signal, settings, sights[name], around[name])
+                    channel = int(self.sky.broadcast[number]["frequency_channel"])
+                    antenna = self.centres.of(signal, channel, sights[name])
+                    table = self._signal(
+                        name, signal, settings, sights[name], around[name], antenna
+                    )
                     rows = np.flatnonzero(table["code"])
                     parts.append(self._columns(number, signal[1:], table, rows))
                     order.append(rows * len(sights) + index)
@@ -151,6 +161,7 @@ class _Part:
                             signal_truth(
                                 (name, signal[1:]), self._times(rows), kept,
                                 self.epochs.clock[rows, 0], off[rows], settings[0],
+                                antenna[rows, 0] if self.centres.there else None,
                             )
                         )  # fmt: skip
         if not parts:
@@ -210,8 +221,9 @@ class _Part:
         return found
 
     def _signal(
-        self, name: str, signal: str, settings: Records, sights: Records, around: Surroundings
-    ) -> Records:
+        self, name: str, signal: str, settings: Records, sights: Records, around: Surroundings,
+        antenna: Floats,
+    ) -> Records:  # fmt: skip
         """Measurements of one signal of one satellite at every epoch."""
         receiver, scene, count = self.receiver, self.scene, len(sights)
         source = f"{receiver.name}.{name}.{signal[1:]}"
@@ -229,8 +241,8 @@ class _Part:
         states = np.where(self.awake, around.states, tracking.BLOCKED)
         out = np.zeros(count, dtype=MEASUREMENT_DTYPE)
         tracking.track(
-            sights, states, around.losses, self.epochs.clock, settings, noise, draws, listed,
-            self.epochs.interval_s, out,
+            sights, states, around.losses, self.epochs.clock, antenna, settings, noise, draws,
+            listed, self.epochs.interval_s, out,
         )  # fmt: skip
         self._remember(name, signal[1:], out)
         return out
@@ -371,13 +383,13 @@ def _renumbered(columns: Columns) -> Columns:
 
 
 def _information(receiver: Receiver, epochs: Epochs, scene: Scene) -> Columns:
-    """What is known of a receiver; of a vehicle's, the antenna's first place."""
+    """What is known of a receiver; of a vehicle's, the first place of its reference point."""
     return Columns.build(
         [scene.start_ns],
         {
             "marker": Ragged.from_texts([receiver.name]),
             "receiver": Ragged.from_texts(["simulated"]),
-            "antenna": Ragged.from_texts([""]),
+            "antenna": Ragged.from_texts([receiver.antenna]),
             "approximate_position_ecef_m": epochs.positions[:1].copy(),
             "antenna_offset_enu_m": np.zeros((1, 3)),
             "interval_s": np.array([epochs.interval_s]),

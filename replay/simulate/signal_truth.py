@@ -23,6 +23,7 @@ def signal_truth(
     clock_s: Floats,
     orbit_error_m: Floats,
     settings: Any,
+    antenna_m: Floats | None = None,
 ) -> Columns:
     """Rows of one signal of one satellite.
 
@@ -39,6 +40,8 @@ def signal_truth(
     orbit_error_m : float64 array (n,), m
         NaN where no healthy message is known yet.
     settings : record of SIGNAL_DTYPE
+    antenna_m : float64 array (n,), m, or None
+        What the antenna adds; None for a receiver without one.
 
     Returns
     -------
@@ -65,4 +68,6 @@ def signal_truth(
     }
     for name in _CARRIER:
         values[name] = np.where(carrier, measured[name], np.nan)
+    if antenna_m is not None:
+        values["antenna_m"] = antenna_m
     return Columns.build(times[0], values, log_time_ns=times[1])

@@ -1,7 +1,8 @@
 """Settings of satellites, atmosphere, receivers and what stands in their way.
 
 In a scenario: `[sky]`, one `[[receivers]]` each, what they have in common in `[receiver]`,
-`[[blockage]]` and `[[slips]]`. Numbers in dB and dB-Hz are plain; the others may have a unit.
+`[[antennas]]`, `[[blockage]]` and `[[slips]]`. Numbers in dB and dB-Hz are plain; the others
+may have a unit.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from replay.configuration import Section, Table, build, literal, merge, quantity
 from replay.errors import ConfigurationError
 from replay.gnss.signals import frequency_hz
 from replay.simulate.air import SIGNED, Ionosphere, Troposphere
+from replay.simulate.antennas import Antenna, check_worn, read_antennas
 from replay.simulate.constellation import SYSTEMS
 
 KINDS: Final = ("vehicle", "static")
@@ -103,6 +105,7 @@ class Receiver(Section, frozen=True):
     mask: Annotated[float, quantity("rad", "lowest elevation")] = 0.17453292519943295
     latency: Annotated[float, quantity("s", "from epoch to availability")] = 0.0
     lever_arm: tuple[Annotated[float, quantity("m", "body, IMU to antenna")], ...] = (0.0, 0.0, 0.0)
+    antenna: str = ""  # of [[antennas]]; none measures at its reference point
     delay: Annotated[float, quantity("s", "behind the vehicle on its path")] = 0.0
     latitude: Annotated[float, quantity("rad", "of a static one, geodetic")] = 0.0
     longitude: Annotated[float, quantity("rad", "of a static one, east")] = 0.0
@@ -152,6 +155,7 @@ class Setup:
     receivers : tuple of Receiver
     blockages : tuple of Blockage
     slips : tuple of Slip
+    antennas : tuple of Antenna
     folder : Path
         Of the scenario: names of files are from there.
     """
@@ -160,6 +164,7 @@ class Setup:
     receivers: tuple[Receiver, ...] = ()
     blockages: tuple[Blockage, ...] = ()
     slips: tuple[Slip, ...] = ()
+    antennas: tuple[Antenna, ...] = ()
     folder: Path = dataclasses.field(default=Path(), compare=False)
 
     def to_toml(self) -> str:
@@ -169,6 +174,7 @@ class Setup:
         lines = [*_lines("[sky]", "sky", self.sky)]
         for name, sections in (
             ("receivers", self.receivers),
+            ("antennas", self.antennas),
             ("blockage", self.blockages),
             ("slips", self.slips),
         ):
@@ -180,16 +186,21 @@ class Setup:
 def _lines(head: str, path: str, section: Section) -> Iterator[str]:
     """Lines of a table, its inner tables after it."""
     yield head
-    inner = []
+    inner, lists = [], []
     for name in section.__struct_fields__:
         value = getattr(section, name)
         if isinstance(value, Section):
             inner.append((f"{path}.{name}", value))
+        elif isinstance(value, tuple) and value and isinstance(value[0], Section):
+            lists.append((f"{path}.{name}", value))
         else:
             yield f"{name} = {literal(value)}"
     yield ""
     for name, value in inner:
         yield from _lines(f"[{name}]", name, value)
+    for name, values in lists:
+        for value in values:
+            yield from _lines(f"[[{name}]]", name, value)
 
 
 SectionT = TypeVar("SectionT", bound=Section)
@@ -225,9 +236,10 @@ def take_setup(table: Table, folder: Path = Path()) -> Setup:
     ConfigurationError
         For an unknown key, a wrong type, an impossible value.
     """
-    given = [name for name in ("sky", "blockage", "slips") if name in table]
+    given = [name for name in ("sky", "antennas", "blockage", "slips") if name in table]
     sky = _read(Sky, table.pop("sky", {}), "sky")
     receivers = _many(Receiver, _with_common(table), "receivers")
+    antennas = read_antennas(table.pop("antennas", []))
     blockages = _many(Blockage, table.pop("blockage", []), "blockage")
     slips = _many(Slip, table.pop("slips", []), "slips")
     if given and not receivers:
@@ -239,13 +251,15 @@ def take_setup(table: Table, folder: Path = Path()) -> Setup:
     names = [receiver.name for receiver in receivers]
     for index, receiver in enumerate(receivers):
         _check_receiver(receiver, f"receivers[{index}]", sky)
+        if receiver.antenna:
+            check_worn(receiver.antenna, receiver.signals, antennas, f"receivers[{index}]")
         if receiver.name in names[:index]:
             raise ConfigurationError(f"two receivers are called {receiver.name!r}")
     for index, blockage in enumerate(blockages):
         _check_blockage(blockage, f"blockage[{index}]", names)
     for index, slip in enumerate(slips):
         _known(slip.receiver, names, f"slips[{index}]")
-    return Setup(sky, receivers, blockages, slips, folder)
+    return Setup(sky, receivers, blockages, slips, antennas, folder)
 
 
 def _read(cls: type[SectionT], table: Any, where: str) -> SectionT:
