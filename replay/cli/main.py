@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 # Commands register themselves on import; what they need is imported when one runs.
-from replay.cli import baselines, logs, looks, runs, studies  # noqa: F401
+from replay.cli import baselines, logs, looks, runs, studies, sweeps, transforms  # noqa: F401
 from replay.cli.app import app, show_error
 from replay.errors import ExitCode, ReplayError
 

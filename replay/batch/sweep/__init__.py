@@ -1,0 +1,1 @@
+"""Sweeps: logs times transforms times settings, in parallel, into one Parquet data set."""
