@@ -184,6 +184,56 @@ NAV_TIME: Final = ChannelSpec(
     "broadcast differences of time scales",
     key=("scales",),
 )
+PRODUCTS: Final = ChannelSpec(
+    "PRODUCTS",
+    "/gnss/products",
+    "replay.ProductInfo",
+    "what files of precise products say of themselves",
+    key=("source",),
+)
+# Products are computed afterwards; their log time is the start of the log, so that a replay
+# may use all of them from its first row on. The valid time is the epoch of the value.
+PRECISE_ORBIT: Final = ChannelSpec(
+    "PRECISE_ORBIT",
+    "/gnss/orbit",
+    "replay.PreciseOrbit",
+    "precise orbits (SP3), all of them known from the start of the log",
+    key=("satellite",),
+)
+PRECISE_CLOCK: Final = ChannelSpec(
+    "PRECISE_CLOCK",
+    "/gnss/clock",
+    "replay.PreciseClock",
+    "precise clocks (RINEX CLK), all of them known from the start of the log",
+    key=("satellite", "station"),
+)
+SIGNAL_BIAS: Final = ChannelSpec(
+    "SIGNAL_BIAS",
+    "/gnss/bias",
+    "replay.SignalBias",
+    "biases of signals (SINEX-BIAS), all of them known from the start of the log",
+    key=("satellite", "station", "system", "kind", "observation", "second_observation"),
+)
+EARTH_ROTATION: Final = ChannelSpec(
+    "EARTH_ROTATION",
+    "/gnss/earth_rotation",
+    "replay.EarthRotation",
+    "pole and rotation of the Earth (ERP), all known from the start of the log",
+)
+IONOSPHERE_MAP: Final = ChannelSpec(
+    "IONOSPHERE_MAP",
+    "/gnss/ionosphere_map",
+    "replay.IonosphereMap",
+    "maps of the ionosphere (IONEX), all of them known from the start of the log",
+    key=("height_m",),
+)
+OCEAN_LOADING: Final = ChannelSpec(
+    "OCEAN_LOADING",
+    "/gnss/{receiver}/ocean_loading",
+    "replay.OceanLoading",
+    "tides that the ocean makes of a station's ground (BLQ)",
+    key=("station",),
+)
 SATELLITES: Final = ChannelSpec(
     "SATELLITES",
     "/gnss/{receiver}/satellites",
@@ -369,6 +419,7 @@ SIGNAL_TRUTH: Final = ChannelSpec(
             "carrier_multipath_m",
             "code_noise_m",
             "carrier_noise_m",
+            "antenna_m",
         )
     },
 )
@@ -526,6 +577,13 @@ CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     NAV,
     NAV_IONOSPHERE,
     NAV_TIME,
+    PRODUCTS,
+    PRECISE_ORBIT,
+    PRECISE_CLOCK,
+    SIGNAL_BIAS,
+    EARTH_ROTATION,
+    IONOSPHERE_MAP,
+    OCEAN_LOADING,
     RECEIVER_EPOCH,
     GNSS_OBS,
     GNSS_FIX,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -29,10 +30,13 @@ class Known:
         Of the receivers, type and radome.
     span_ns : tuple of 2 int, or None
         First and last time.
+    markers : mapping of receiver to str
+        As the first header of each states it.
     """
 
     antennas: tuple[str, ...]
     span_ns: tuple[int, int] | None
+    markers: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def antex_stream(

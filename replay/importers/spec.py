@@ -195,6 +195,9 @@ class Stream(Section, frozen=True):
     `transmitted`; left out, the format's own way. `position_ecef_m` stands in for the
     approximate position that the file states. Of an ANTEX file the antennas are read that
     the receivers of the other streams name; `satellites` adds those of all satellites.
+    Of precise orbits, clocks and maps all is read, or what lies at most `margin` from the
+    rows of the other streams. `site` names the station of a BLQ file that the receiver is;
+    left out, each receiver's marker tells.
 
     Of receivers' binary formats: `approximate_time` is a GPS date near the start for
     files that do not tell theirs; `lever_arm` goes with the receiver's own fixes, and
@@ -214,6 +217,8 @@ class Stream(Section, frozen=True):
     )
     truth: bool = False
     satellites: bool = False
+    margin: Annotated[float, quantity("s", "of products around the log, 0 for all")] = 0.0
+    site: str = ""
     gyro_scale: Annotated[float, quantity("rad", "of one count of raw inertial samples")] = 0.0
     accel_scale: Annotated[float, quantity("m/s", "of one count of raw inertial samples")] = 0.0
 

@@ -20,9 +20,16 @@ from replay.errors import ConfigurationError, ForeignFileError
 from replay.importers import receiver_streams
 from replay.importers.antex_streams import Known, antex_stream
 from replay.importers.corrected_ranges import corrected_ranges_stream
+from replay.importers.earth_rotation import earth_rotation_stream
 from replay.importers.files import File
 from replay.importers.findings import Findings
+from replay.importers.ionex import ionex_stream
+from replay.importers.ocean_loading import ocean_loading_stream
+from replay.importers.product_joins import SERIES, check_frames, join_series
+from replay.importers.rinex_clock import rinex_clock_stream
 from replay.importers.rinex_streams import UNKNOWN_NS, rinex_nav_stream, rinex_obs_stream
+from replay.importers.sinex_bias import sinex_bias_stream
+from replay.importers.sp3 import sp3_stream
 from replay.importers.spec import Spec, Stream
 from replay.log.codec import codec_for
 from replay.log.columns import Columns, Int64, concatenate
@@ -61,6 +68,12 @@ FORMATS: Final[dict[str, Format]] = {
     "novatel": Format(receiver_streams.novatel_stream),
     "nmea": Format(receiver_streams.nmea_stream),
     "antex": Format(None, available="start", read_late=antex_stream),
+    "sp3": Format(None, available="start", read_late=sp3_stream),
+    "rinex-clk": Format(None, available="start", read_late=rinex_clock_stream),
+    "sinex-bias": Format(None, available="start", read_late=sinex_bias_stream),
+    "erp": Format(None, available="start", read_late=earth_rotation_stream),
+    "ionex": Format(None, available="start", read_late=ionex_stream),
+    "blq": Format(None, available="start", read_late=ocean_loading_stream),
 }
 TABLE_FORMATS: Final = ("csv", "rtklib-pos", "matlab")
 _NAVIGATION: Final = (
@@ -68,6 +81,9 @@ _NAVIGATION: Final = (
     channels.NAV_IONOSPHERE.topic,
     channels.NAV_TIME.topic,
     channels.ANTENNAS.topic,
+    channels.PRODUCTS.topic,
+    channels.SIGNAL_BIAS.topic,
+    *SERIES,
 )
 
 
@@ -168,19 +184,22 @@ class Streams:
         return read(file, self._findings, stream)
 
     def _known(self) -> Known:
-        """Antennas of the receivers so far, in their order, and the time that their rows span."""
+        """Antennas and markers of the receivers so far, and the time that their rows span."""
         antennas: dict[str, None] = {}
+        markers: dict[str, str] = {}
         times = []
         for topic, parts in self._parts.items():
             for part in parts:
                 if channels.RECEIVER.matches(topic):
                     texts = part.columns.ragged("antenna").texts()
                     antennas |= dict.fromkeys(text.rstrip() for text in texts)
+                    marker = part.columns.ragged("marker").texts()[0]
+                    markers.setdefault(channels.RECEIVER.parts(topic)["receiver"], marker)
                 if topic not in _NAVIGATION:
                     valid = part.columns.valid_time_ns
                     times += valid[valid >= 0].tolist()
         antennas.pop("", None)
-        return Known(tuple(antennas), (min(times), max(times)) if times else None)
+        return Known(tuple(antennas), (min(times), max(times)) if times else None, markers)
 
     def topics(self) -> dict[str, str]:
         """Topic of each name, which is that of the stream and the topic."""
@@ -203,17 +222,24 @@ class Streams:
         if start == UNKNOWN_NS:
             every = [part.columns for parts in self._parts.values() for part in parts]
             start = _first([columns.valid_time_ns for columns in every])
+        if channels.PRODUCTS.topic in self._parts:
+            products = self._parts[channels.PRODUCTS.topic]
+            check_frames(concatenate([part.columns for part in products]), self._findings)
         return {topic: self._join(topic, parts, start) for topic, parts in self._parts.items()}
 
     def _join(self, topic: str, parts: list[_Part], start: int) -> Columns:
-        columns = concatenate([part.columns for part in parts])
+        columns = (
+            join_series(topic, [part.columns for part in parts], self._findings)
+            if topic in SERIES
+            else concatenate([part.columns for part in parts])
+        )
         log = np.where(columns.log_time_ns < 0, start, columns.log_time_ns)
         valid = np.where(columns.valid_time_ns < 0, start, columns.valid_time_ns)
         columns = dataclasses.replace(columns, log_time_ns=log, valid_time_ns=valid)
         order = np.lexsort((valid, log)).astype(np.int64)
         if (np.diff(order) != 1).any():
             columns = columns.take(order)
-        if topic in _NAVIGATION or len(parts) > 1:
+        if topic not in SERIES and (topic in _NAVIGATION or len(parts) > 1):
             columns = columns.take(self._distinct(topic, columns))
         sequence = np.arange(len(columns), dtype=np.uint32)
         return dataclasses.replace(columns, sequence=sequence)
