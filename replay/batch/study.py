@@ -261,7 +261,7 @@ class _Schedule:
     ) -> None:
         self._study = study
         self._members = members
-        self._folder = options.folder
+        self._options = options
         self._workers = workers
         self._begun: dict[int, _Begun] = {}
         self._done: dict[int, Done] = {}
@@ -285,7 +285,7 @@ class _Schedule:
         logs_waiting = next_member - len(self._done)
         if next_member < len(self._members) and logs_waiting <= self._workers.jobs:
             member = self._members[next_member]
-            log = self._folder / "logs" / member.folder / f"{INPUT}.mcap"
+            log = self._options.folder / "logs" / member.folder / f"{INPUT}.mcap"
             log.parent.mkdir(parents=True, exist_ok=True)
             self._begun[next_member] = _Begun(member, {INPUT: log}, [], {})
             self._tasks[self._workers.submit(_make_log, member, log)] = next_member, None
@@ -314,14 +314,14 @@ class _Schedule:
             begun.found[variant.name] = result
         if not begun.complete:
             return None
-        self._done[place] = _whole(begun)
+        self._done[place] = _whole(begun, self._options)
         return self._done[place]
 
 
-def _whole(begun: _Begun) -> Done:
+def _whole(begun: _Begun, options: Options) -> Done:
     member = begun.member
     first = member.number == 0
-    if not first:
+    if not first or not options.keep_logs:
         discard_logs(begun.logs)
     names = [variant.name for variant in member.variants]
     return Done(
@@ -383,5 +383,14 @@ def _lee2010() -> Study:
     return STUDY
 
 
-STUDIES: Final[dict[str, Callable[[], Study]]] = {"lee2010": _lee2010}
+def _lee2010_degradation() -> Study:
+    from replay.batch.lee2010_degradation.run import STUDY
+
+    return STUDY
+
+
+STUDIES: Final[dict[str, Callable[[], Study]]] = {
+    "lee2010": _lee2010,
+    "lee2010-degradation": _lee2010_degradation,
+}
 """Studies by name; each is imported when it is asked for."""

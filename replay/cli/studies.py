@@ -32,7 +32,6 @@ def study(
 ) -> None:
     """Simulate, run and measure the cases of a study; write its report and recording."""
     from replay.batch.study import STUDIES, Options, find_study, run_study
-    from replay.batch.study import discard_logs as discard
     from replay.batch.workers import Workers
 
     if name is None:
@@ -54,9 +53,6 @@ def study(
     losses = [loss for member in done for loss in member.losses]
     for loss in losses:
         warn(f"loss: {loss}")
-    if discard_logs:
-        for member in done:
-            discard(member.logs)
     leave(ExitCode.LOSS if losses else ExitCode.OK)
 
 

@@ -144,6 +144,8 @@ def phase_rest(side: Observed) -> Floats:
         return picked(side.truth[field].astype(np.float64), at_truth)
 
     def modelled(field: str) -> Floats:
+        if field not in side.corrections.values:  # an older log's channel
+            return np.zeros(len(rows))
         values = side.corrections[field].astype(np.float64)
         return picked(np.where(side.corrections.is_present(field), values, 0.0), at_model)
 
@@ -151,6 +153,7 @@ def phase_rest(side: Observed) -> Floats:
     phase = np.where(rows.is_present("carrier_phase_cycles"), phase, np.nan)
     length = wavelengths(satellites, signals)
     delays = modelled("hydrostatic_m") + modelled("wet_m") + modelled("shapiro_m")
+    delays += modelled("antenna_m")
     # The broadcast range less clock is the true one less the error of orbit and clock.
     broadcast = true("range_m") - true("satellite_clock_m") - true("orbit_error_m")
     whole = phase - true("ambiguity_cycles")

@@ -342,7 +342,7 @@ def _search(
 @njit(cache=True)
 def _write(
     usable: Array, n: int, pairs: Array, station: Array, master: Array, x: Array, P: Array,
-    k: Record, rcfg: Record, cfg: Record, age: float, baseline: float, t: int, log_t: int,
+    k: Record, rcfg: Record, cfg: Record, age: float, t: int, log_t: int,
     ambiguities: Array, residuals: Array, counts: Array,
 ) -> None:  # fmt: skip
     """Ambiguities of an epoch, and what is left of the phases whose integers are known."""
@@ -395,7 +395,8 @@ def _write(
                 sign = 1.0 if end == 0 else -1.0
                 u, v = station[one["rover"]], master[one["base"]]
                 left += sign * (difference(u, v, level, True) - one["computed"])
-                spread += difference_variance(u, v, level, True, age, baseline, rcfg)
+                # Errors of orbits are what is looked for, not noise.
+                spread += difference_variance(u, v, level, True, age, 0.0, rcfg)
             out = residuals[counts[RESIDUALS]]
             counts[RESIDUALS] += 1
             out["t"] = t
@@ -533,6 +534,6 @@ def run_baseline(
             row["known"] = known
             row["status"] = AMBIGUITY_FIXED if row["fixed"] > 0 else AMBIGUITY_REJECTED
         _write(
-            usable, many, pairs, part, base_part, x, P, k, rcfg, cfg, abs(age), baseline, t, log_t,
+            usable, many, pairs, part, base_part, x, P, k, rcfg, cfg, abs(age), t, log_t,
             ambiguities, residuals, counts,
         )  # fmt: skip

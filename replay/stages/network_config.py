@@ -37,7 +37,7 @@ class Integers(Section, frozen=True):
     ionosphere_noise: Annotated[float, quantity("1", "walk in 1 s, m per m of baseline")] = 1e-7
     wet_sigma: Annotated[float, quantity("m", "zenith, of each station")] = 0.05
     wet_noise: Annotated[float, quantity("m", "walk in 1 s, zenith, of each station")] = 1e-5
-    orbit_sigma: Annotated[float, quantity("1", "m per m of baseline, of a phase")] = 1e-8
+    orbit_sigma: Annotated[float, quantity("1", "m per m of baseline, of a phase")] = 5e-8
     ambiguity_sigma: Annotated[float, quantity("m", "when it begins")] = 30.0
     ambiguity_noise: Annotated[float, quantity("m", "walk of an ambiguity in 1 s")] = 1e-5
     code_gate: Annotated[float, quantity("1", "deviations of a residual that are believed")] = 4.0
@@ -79,7 +79,7 @@ class Interpolation(Section, frozen=True):
     # Plane through the master, linear combination, inverse distances, collocation.
     method: Literal["lim", "lcm", "dim", "lsc"] = "lim"
     slope: Annotated[float, quantity("1", "m per m, deviation of the errors' slopes")] = 4e-6
-    curvature: Annotated[float, quantity("1", "1/m, deviation of their second derivatives")] = 3e-12
+    curvature: Annotated[float, quantity("1", "1/m, deviation of their second derivatives")] = 5e-13
     # Longer than the stations' interval: of older errors nobody waits for the next ones.
     max_age: Annotated[float, quantity("s", "of a station's errors; carried on by their rate")] = (
         10.0

@@ -281,8 +281,9 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array, context: Context
         if name not in ("dynamics", "ionosphere", "troposphere"):
             record[name] = getattr(motion, name)
     network = getattr(config, "interpolation", None)
-    if network is not None and getattr(config, "mode", "") == "network":
-        # A satellite that the network says nothing of has all of its errors.
+    alone = getattr(config, "mode", "") == "single" and not motion.ionosphere
+    if network is not None and (getattr(config, "mode", "") == "network" or alone):
+        # What no network and no state of the filter takes off is in the weight.
         record["baseline_noise"] = max(differences.baseline_noise, network.slope)
     record["gap"] = longest_gap(motion.gap, nominal_interval(context, Port(channels.GNSS_OBS)))
     record["dynamics"] = _DYNAMICS.index(motion.dynamics)

@@ -37,6 +37,7 @@ _CORRECTIONS: Final = (
     ("group_delay_m", "Group delay", "satellite"),
     ("sagnac_m", "Earth's turning", "space"),
     ("shapiro_m", "Shapiro delay", "space"),
+    ("antenna_m", "Receiver's antenna", "space"),
 )
 Names = npt.NDArray[np.str_]
 

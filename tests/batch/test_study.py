@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -24,6 +26,7 @@ from replay.batch.study import (
     INPUT,
     STUDIES,
     Done,
+    Measured,
     Member,
     Options,
     Study,
@@ -33,10 +36,11 @@ from replay.batch.study import (
     find_study,
     run_study,
 )
+from replay.batch.workers import Workers
 from replay.cli import main
 from replay.errors import ConfigurationError, UsageError
 from replay.evaluate import evaluate_run
-from replay.evaluate.network_run import NetworkFigures
+from replay.evaluate.network_run import SETTLING_S, NetworkFigures
 from replay.simulate import load_scenario
 from tests.batch import fake_network
 from tests.batch.fake_network import PLANTED
@@ -58,14 +62,14 @@ duration = 20.0
 """
 
 
-def measure(log: Path, variant: Variant) -> tuple[str, float]:
+def measure(log: Path, variant: Variant) -> Measured:
     """A figure of a run; in this module, so that another process finds it."""
     error = evaluate_run(log).position_error_m
     assert error is not None
-    return variant.name, error["horizontal"].rms
+    return Measured((variant.name, error["horizontal"].rms), log.stat().st_size)
 
 
-def present(done: Sequence[Done], options: Options) -> Mapping[str, Path]:
+def present(done: Sequence[Done], options: Options, workers: Workers) -> Mapping[str, Path]:
     path = options.folder / "figures.json"
     path.write_bytes(msgspec.json.encode([member.figures for member in done]))
     return {"figures": path}
@@ -102,12 +106,41 @@ def test_processes_beside_each_other_give_what_one_gives(study: Study, tmp_path:
     assert len({figures["plain"][1] for figures in alone}) == 4
 
 
+def test_costlier_runs_begin_first_and_few_logs_wait(study: Study, tmp_path: Path) -> None:
+    def members() -> list[Member]:
+        one = study.members()[0]
+        costs = {"plain": 1.0, "bare": 2.0}
+        variants = tuple(dataclasses.replace(v, cost=costs[v.name]) for v in one.variants)
+        return [dataclasses.replace(one, label=f"m{i}", variants=variants) for i in range(4)]
+
+    begun: list[str] = []
+
+    class Watched(Workers):
+        def submit(self, work: Callable[..., Any], *given: Any) -> Future[Any]:
+            target = given[1]
+            begun.append(f"{target.parent.name} {target.stem}")
+            return super().submit(work, *given)
+
+    with Watched() as workers:
+        many = dataclasses.replace(study, members=members)
+        done = run_study(many, Options(tmp_path / "out"), workers=workers)
+    assert [d.member.label for d in done] == ["m0", "m1", "m2", "m3"]
+    assert all(list(d.figures) == ["plain", "bare"] for d in done)
+    assert begun == [
+        "m0 input", "m1 input", "m0 bare", "m1 bare", "m0 plain",
+        "m2 input", "m2 bare", "m1 plain", "m3 input", "m3 bare", "m2 plain", "m3 plain",
+    ]  # fmt: skip
+
+
 def test_logs_of_the_first_seed_stay_and_of_others_go(study: Study, tmp_path: Path) -> None:
     options = Options(tmp_path / "out", seeds=2, jobs=1, labels=("2",))
     done = run_study(study, options)
     assert [(d.member.label, d.member.number) for d in done] == [("case2", 0), ("case2", 1)]
     assert all(path.is_file() for path in done[0].logs.values())
     assert set(done[0].logs) == {INPUT, "plain", "bare"}
+    # What is drawn is of the first seed, and of the log as it was written.
+    sizes = {name: done[0].logs[name].stat().st_size for name in ("plain", "bare")}
+    assert done[0].pictures == sizes and done[1].pictures == {}
     assert not any(path.exists() for path in done[1].logs.values())
     assert [p.name for p in (options.folder / "logs").iterdir()] == ["case2"]
     discard_logs(done[0].logs)
@@ -185,11 +218,12 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> list[Done]:
     folder = tmp_path_factory.mktemp("lee")
     member = next(m for m in lee.members() if m.label == "case2")
     logs: dict[str, Path] = {}
-    figures = {}
+    figures, pictures = {}, {}
     for mode in ("network", "single"):
         rows = fake_network.make_network(150.0, run=mode, single=mode == "single")
         logs[mode] = write(folder / f"{mode}.mcap", rows, fake_network.make_metadata(mode))
-        figures[mode] = lee.measure(logs[mode], Variant(mode, "network-ins-tc"))
+        measured = lee.measure(logs[mode], Variant(mode, "network-ins-tc"))
+        figures[mode], pictures[mode] = measured.figures, measured.picture
     second = dict(figures)
     network = figures["network"]
     assert isinstance(network, NetworkFigures)
@@ -203,7 +237,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> list[Done]:
         epochs=msgspec.structs.replace(network.epochs, wrong=network.epochs.wrong + 2),
     )  # fmt: skip
     return [
-        Done(member, logs, figures, (), 1.0),
+        Done(member, logs, figures, (), 1.0, pictures),
         Done(dataclasses.replace(member, number=1), {}, second, (), 1.0),
     ]
 
@@ -236,14 +270,15 @@ def test_tables_tell_published_mean_and_worst(done: list[Done]) -> None:
 
 def test_page_recording_and_tables_are_written(done: list[Done], tmp_path: Path) -> None:
     options = Options(tmp_path, seeds=2, labels=("2",))
-    files = lee.present(done, options)
+    with Workers() as workers:
+        files = lee.present(done, options, workers)
     assert {name: path.name for name, path in files.items()} == {
         "tables": "tables.json", "report": "report.html", "recording": "recording.rrd",
     }  # fmt: skip
     page = files["report"].read_text()
     for number in range(3, 11):
         assert f"<h2>Figure {number}. " in page
-    assert "Assumptions" in page and "2 seeds" in page and "60 s after" in page
+    assert "Assumptions" in page and "2 seeds" in page and f"{SETTLING_S:g} s after" in page
     assert "--seeds 2 --cases 2" in page
     content = json.loads(files["tables"].read_text())
     assert len(content["members"]) == 2 and content["published"]["success_percent"]["case1"] == 99.7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,12 @@ from replay.evaluate.network import (
     closures,
     epoch_integers,
 )
-from replay.evaluate.network_residuals import Observed, residual_figures, rover_residuals
+from replay.evaluate.network_residuals import (
+    Observed,
+    residual_figures,
+    rover_residuals,
+    wavelengths,
+)
 from replay.evaluate.network_run import network_figures, read_network_run, read_stations
 from replay.evaluate.signal_table import SignalTable, labels
 from replay.log.columns import Columns, Ragged
@@ -176,6 +182,30 @@ def test_single_mode_takes_its_differences_from_the_integers(made: dict[str, Col
     np.testing.assert_allclose(single.before_m, network.before_m, atol=1e-12)
     assert np.isnan(single.after_m).all()
     assert residual_figures(single)["1C"].after_rms_m is None
+
+
+def test_what_an_antenna_adds_and_the_corrections_model_leaves_nothing(
+    made: dict[str, Columns],
+) -> None:
+    rover, master = observed(made, "rover"), observed(made, "mref")
+    # Of each satellite another, so that differences do not hide it.
+    name = labels(rover.observations, "satellite")
+    added_m = 0.01 * np.char.lstrip(name.astype(np.str_), "G").astype(np.float64)
+    length_m = wavelengths(name, labels(rover.observations, "signal"))
+    phases = rover.observations["carrier_phase_cycles"] + added_m / length_m
+    values = {**rover.observations.values, "carrier_phase_cycles": phases}
+    received = dataclasses.replace(rover.observations, values=values)
+    told = dict(zip(zip(received.valid_time_ns, name, strict=True), added_m, strict=True))
+    rows = rover.corrections
+    keys = zip(rows.valid_time_ns, labels(rows, "satellite"), strict=True)
+    modelled = {**rows.values, "antenna_m": np.array([told[key] for key in keys])}
+    with_antenna = Observed(received, dataclasses.replace(rows, values=modelled), rover.truth)
+    corrections = made["/network/rover/corrections"]
+    plain = rover_residuals(rover, master, corrections)
+    found = rover_residuals(with_antenna, master, corrections)
+    np.testing.assert_allclose(found.before_m, plain.before_m, atol=1e-7)
+    unmodelled = rover_residuals(Observed(received, rows, rover.truth), master, corrections)
+    assert np.abs(unmodelled.before_m - plain.before_m).min() > 0.02
 
 
 # a run from its log

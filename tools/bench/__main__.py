@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from rich.console import Console
 
-from tools.bench import formats, gnss, replaying, simulator
+from tools.bench import formats, gnss, network, replaying, simulator
 from tools.bench.row import Row, summary
 
 BENCHES: dict[str, Callable[..., list[Row]]] = {
@@ -24,6 +24,7 @@ BENCHES: dict[str, Callable[..., list[Row]]] = {
     "view": formats.bench_view,
     "diff": formats.bench_diff,
     "gnss": gnss.bench_gnss,
+    "network": network.bench_network,
     "simulator": simulator.bench_simulator,
     "importers": formats.bench_importers,
     "elementary": formats.bench_elementary,
