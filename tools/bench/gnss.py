@@ -112,7 +112,7 @@ def run_stages(pipeline: str, rows: dict[str, Columns]) -> int:
     found = find_pipeline(pipeline)
     config = build(found.config, [{"antenna": {"base_position": list(BASE_POSITION)}}])
     block = dict(rows)
-    for stage in found.stages():
+    for stage in found.stages(config, ()):
         state = stage.start(config, Context({}, {}))
         _, outputs = stage.step(state, block)
         block.update(outputs)
