@@ -379,12 +379,15 @@ def correct_epoch(
                 row["value"] = 0.0
                 for b in range(count):
                     row["value"] += weights[b] * errors[b] if used[b] else 0.0
+                misfit = plane_misfit(place, used, errors)
+                row["misfit"] = misfit
                 row["sigma"] = 0.0
                 if row["satellite"] != common[g]:
-                    row["sigma"] = prediction_sigma(
+                    # Stations that do not agree say that the field is not what it is taken for.
+                    spread = prediction_sigma(
                         weights, place, used, rover[0], rover[1], sigmas, field[0], field[1]
                     )
-                row["misfit"] = plane_misfit(place, used, errors)
+                    row["sigma"] = sqrt(spread * spread + misfit * misfit)
                 row["stations"] = stations
                 row["age"] = age * _NS
         start = end
