@@ -13,6 +13,7 @@ from numba import njit
 from replay.kernels._gpt import COEFFICIENTS
 from replay.kernels.atmosphere import vapour_pressure, zenith_hydrostatic, zenith_wet
 from replay.kernels.elementary import cos, pow, sin, sincos, sqrt
+from replay.kernels.spherical_harmonics import spherical_harmonics
 
 _TWO_PI: Final = 6.283185307179586
 _YEAR_DAYS: Final = 365.25
@@ -142,18 +143,8 @@ def gpt(
     sin_lon, cos_lon = sincos(longitude)
     x, y, z = cos_lat * cos_lon, cos_lat * sin_lon, sin_lat
     # Unnormalised harmonics: v holds the cosine terms, w the sine terms.
-    v, w = np.zeros((_DEGREE + 1, _DEGREE + 1)), np.zeros((_DEGREE + 1, _DEGREE + 1))
-    v[0, 0] = 1.0
-    for m in range(_DEGREE + 1):
-        if m > 0:
-            v[m, m] = (2 * m - 1) * (x * v[m - 1, m - 1] - y * w[m - 1, m - 1])
-            w[m, m] = (2 * m - 1) * (x * w[m - 1, m - 1] + y * v[m - 1, m - 1])
-        if m < _DEGREE:
-            v[m + 1, m] = (2 * m + 1) * z * v[m, m]
-            w[m + 1, m] = (2 * m + 1) * z * w[m, m]
-        for n in range(m + 2, _DEGREE + 1):
-            v[n, m] = ((2 * n - 1) * z * v[n - 1, m] - (n + m - 1) * v[n - 2, m]) / (n - m)
-            w[n, m] = ((2 * n - 1) * z * w[n - 1, m] - (n + m - 1) * w[n - 2, m]) / (n - m)
+    v, w = np.empty((_DEGREE + 1, _DEGREE + 1)), np.empty((_DEGREE + 1, _DEGREE + 1))
+    spherical_harmonics(x, y, z, v, w)
     sums = np.zeros(5)
     for k in range(5):
         i = 0
