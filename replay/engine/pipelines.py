@@ -130,34 +130,34 @@ def _network() -> Parts:
 
 
 def _network_rtk() -> Parts:
-    from replay.stages.network import network_stages
+    from replay.stages.network import rover_stages
     from replay.stages.network_config import NetworkRtkConfig
     from replay.stages.rtk import Rtk
 
     def stages(config: NetworkRtkConfig, topics: Collection[str]) -> Stages:
-        return (*network_stages(config, topics), Rtk(corrected=config.mode == "network"))
+        return (*rover_stages(config, topics), Rtk(corrected=config.mode == "network"))
 
     return NetworkRtkConfig, stages
 
 
 def _network_ins_tc() -> Parts:
-    from replay.stages.network import network_stages
+    from replay.stages.network import rover_stages
     from replay.stages.network_config import NetworkInsConfig
     from replay.stages.rtk_ins_tc import RtkInertial
 
     def stages(config: NetworkInsConfig, topics: Collection[str]) -> Stages:
-        return (*network_stages(config, topics), RtkInertial(corrected=config.mode == "network"))
+        return (*rover_stages(config, topics), RtkInertial(corrected=config.mode == "network"))
 
     return NetworkInsConfig, stages
 
 
 def _network_virtual() -> Parts:
-    from replay.stages.network import network_stages
+    from replay.stages.network import corrected_stages
     from replay.stages.network_config import NetworkConfig
     from replay.stages.network_virtual import NetworkVirtual
 
     def stages(config: NetworkConfig, topics: Collection[str]) -> Stages:
-        return (*network_stages(config, topics), NetworkVirtual())
+        return (*corrected_stages(config, topics), NetworkVirtual())
 
     return NetworkConfig, stages
 

@@ -28,7 +28,7 @@ from replay.kernels.network_records import (
     STEP_ROW_DTYPE,
     WIDE_LANE_SIGNAL,
 )
-from replay.kernels.network_search import FIRST, WIDE, condition_on, floats, search_integers
+from replay.kernels.network_search import FIRST, SECOND, WIDE, condition_on, floats, search_integers
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.rtk import heed_base, update_epoch
 from replay.kernels.rtk_output import note
@@ -293,9 +293,9 @@ def _search(
     more = np.zeros(COUNT_LIMIT, dtype=INTEGER_DTYPE)
     spare = np.zeros(2, dtype=STEP_ROW_DTYPE)
     xc, Pc = x[:states].copy(), P[:states, :states].copy()
-    count = _refer(usable, n, k, False, True, cfg["lock"], found)
-    search_integers(found, count, cfg["least"], xc, Pc, states, cfg, steps)
-    _compare(found, count, k, cfg, t, log_t, notes, counts)
+    tried = _refer(usable, n, k, False, True, cfg["lock"], found)
+    search_integers(found, tried, cfg["least"], xc, Pc, states, cfg, steps)
+    _compare(found, tried, k, cfg, t, log_t, notes, counts)
     # Of a system with known satellites the others are looked for given those.
     unknown = 0
     count = _refer(usable, n, k, True, False, cfg["lock"], more)
@@ -303,10 +303,8 @@ def _search(
         if k["known"][more[i]["satellite"]] == 0:
             unknown += 1
     if unknown > 0:
-        for i in range(states):
-            xc[i] = x[i]
-            for j in range(states):
-                Pc[i, j] = P[i, j]
+        xc[:] = x[:states]
+        Pc[:, :] = P[:states, :states]
         b, gain, dx = np.zeros(states), np.zeros(states), np.zeros(states)
         place = 0
         for i in range(count):
@@ -324,16 +322,9 @@ def _search(
         search_integers(more, place, 1, xc, Pc, states, cfg, spare)
         _wait(more, place, k, cfg)
     # Of the others the search from nothing is all there is.
-    for system in range(SYSTEMS):
-        for i in range(n):
-            if usable[i]["system"] == system and k["known"][usable[i]["satellite"]] == 1:
-                for j in range(COUNT_LIMIT):
-                    if found[j]["system"] == system:
-                        found[j]["satellite"] = -1
-                break
     place = 0
-    for i in range(COUNT_LIMIT):
-        if found[i]["wavelength"][0] > 0.0 and found[i]["satellite"] >= 0:
+    for i in range(tried):
+        if not _known_in_system(usable, n, found[i]["system"], k):
             found[place] = found[i]
             place += 1
     _wait(found, place, k, cfg)
@@ -349,7 +340,6 @@ def _write(
     found = np.zeros(COUNT_LIMIT, dtype=INTEGER_DTYPE)
     chosen = np.zeros(1, dtype=np.int64)
     a, Q = np.zeros(1), np.zeros((1, 1))
-    swap = np.zeros(1, dtype=INTEGER_DTYPE)
     count = _refer(usable, n, k, False, False, 0, found)
     for i in range(count):
         c = found[i]
@@ -362,16 +352,10 @@ def _write(
         integer[1] = float(k["second"][satellite] - k["second"][reference])
         integer[2] = integer[0] - integer[1]
         for level in range(3):
+            step = WIDE
             if level < 2:
-                swap[0] = c
-                swap[0]["state"][0] = c["state"][level]
-                swap[0]["base"][0] = c["base"][level]
-                swap[0]["wavelength"][0] = c["wavelength"][level]
-                chosen[0] = 0
-                floats(swap, chosen, 1, FIRST, x, P, a, Q)
-            else:
-                chosen[0] = i
-                floats(found, chosen, 1, WIDE, x, P, a, Q)
+                step = FIRST if level == 0 else SECOND
+            floats(found, chosen, 1, step, x, P, a, Q)
             row = ambiguities[counts[AMBIGUITIES]]
             counts[AMBIGUITIES] += 1
             row["t"] = t
@@ -426,7 +410,7 @@ def run_baseline(
     epochs, rows, base_epochs, base_rows : arrays of EPOCH_DTYPE and MEASURED_DTYPE
         Of the station and of the master.
     partner, release : int64 arrays (epochs,)
-        As :func:`replay.kernels.rtk.match_epochs` filled them.
+        As :func:`replay.kernels.epoch_matching.match_epochs` filled them.
     ambiguities : array (3 * rows,) of AMBIGUITY_ROW_DTYPE
     steps : array (2 * epochs,) of STEP_ROW_DTYPE
     residuals : array (2 * rows,) of RESIDUAL_ROW_DTYPE
@@ -518,14 +502,9 @@ def run_baseline(
         for i in range(many):
             known += k["known"][usable[i]["satellite"]]
         for level in range(2):
+            steps[counts[STEPS]] = tried[level]
             row = steps[counts[STEPS]]
             counts[STEPS] += 1
-            row["candidates"] = tried[level]["candidates"]
-            row["fixed"] = tried[level]["fixed"]
-            row["ratio"] = tried[level]["ratio"]
-            row["w_ratio"] = tried[level]["w_ratio"]
-            row["threshold"] = tried[level]["threshold"]
-            row["success"] = tried[level]["success"]
             row["t"] = t
             row["log_t"] = log_t
             row["signal"] = WIDE_LANE_SIGNAL

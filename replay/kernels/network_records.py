@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from replay.kernels.gnss_records import SATELLITES
+from replay.kernels.rtk_records import RESOLUTION_ROW_DTYPE
 
 WIDE_LANE_SIGNAL: Final = ord("W") + 256 * ord("L")
 """Number of the signal WL, as :mod:`replay.kernels.gnss_records` numbers signals."""
@@ -64,19 +65,12 @@ INTEGER_DTYPE: Final = np.dtype(
     align=True,
 )
 
+# One step of a search: what an attempt gave, of which signal, and what is known after it.
 STEP_ROW_DTYPE: Final = np.dtype(
     [
-        ("t", "<i8"),
-        ("log_t", "<i8"),
+        *((name, RESOLUTION_ROW_DTYPE[name]) for name in RESOLUTION_ROW_DTYPE.names or ()),
         ("signal", "<i8"),
-        ("candidates", "<i8"),
-        ("fixed", "<i8"),
         ("known", "<i8"),
-        ("ratio", "<f8"),
-        ("w_ratio", "<f8"),
-        ("threshold", "<f8"),
-        ("success", "<f8"),
-        ("status", "<i8"),
     ],
     align=True,
 )

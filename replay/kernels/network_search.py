@@ -21,6 +21,7 @@ from replay.kernels.types import Array, Record
 
 WIDE: Final = 0
 FIRST: Final = 1
+SECOND: Final = 2
 
 _NODES: Final = 20_000
 _LARGEST_RATIO: Final = 9999.9
@@ -29,12 +30,13 @@ _HOLD_M: Final = 1e-4  # deviation of what is taken as known
 
 @njit(cache=True)
 def _weights(c: Record, level: int, index: Array, weight: Array) -> int:
-    """States and weights (1/m) of a wide lane or first-frequency double difference."""
-    index[0] = c["state"][0]
-    index[1] = c["base"][0]
-    weight[0] = 1.0 / c["wavelength"][0]
+    """States and weights (1/m) of a double difference: of the wide lane, or of one frequency."""
+    slot = 1 if level == SECOND else 0
+    index[0] = c["state"][slot]
+    index[1] = c["base"][slot]
+    weight[0] = 1.0 / c["wavelength"][slot]
     weight[1] = -weight[0]
-    if level == FIRST:
+    if level != WIDE:
         return 2
     index[2] = c["state"][1]
     index[3] = c["base"][1]
@@ -111,6 +113,17 @@ def condition_on(
 
 
 @njit(cache=True)
+def _clear(out: Record, cfg: Record) -> None:
+    """A step that has tried nothing."""
+    out["candidates"] = 0
+    out["fixed"] = 0
+    out["ratio"] = 0.0
+    out["w_ratio"] = 0.0
+    out["success"] = 0.0
+    out["threshold"] = cfg["threshold"]
+
+
+@njit(cache=True)
 def search_step(
     found: Array, count: int, least: int, level: int, x: Array, P: Array, cfg: Record, out: Record
 ) -> bool:
@@ -135,12 +148,7 @@ def search_step(
         Whether a set of integers passed.
     """
     chosen = np.zeros(count, dtype=np.int64)
-    out["candidates"] = 0
-    out["fixed"] = 0
-    out["ratio"] = 0.0
-    out["w_ratio"] = 0.0
-    out["success"] = 0.0
-    out["threshold"] = cfg["threshold"]
+    _clear(out, cfg)
     turn = 0
     while True:
         m = 0
@@ -215,12 +223,7 @@ def search_integers(
     """
     for k in range(count):
         found[k]["active"] = 1
-    steps[FIRST]["candidates"] = 0
-    steps[FIRST]["fixed"] = 0
-    steps[FIRST]["ratio"] = 0.0
-    steps[FIRST]["w_ratio"] = 0.0
-    steps[FIRST]["success"] = 0.0
-    steps[FIRST]["threshold"] = cfg["threshold"]
+    _clear(steps[FIRST], cfg)
     if not search_step(found, count, least, WIDE, x, P, cfg, steps[WIDE]):
         for k in range(count):
             found[k]["active"] = 0

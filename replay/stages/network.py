@@ -12,7 +12,7 @@ from replay.errors import MissingChannelError, UsageError
 from replay.stages.base import BASE, RECEIVER, Stage
 from replay.stages.baseline_errors import BaselineErrors
 from replay.stages.network_ambiguities import NetworkAmbiguities
-from replay.stages.network_config import NetworkSettings
+from replay.stages.network_config import NetworkInsConfig, NetworkRtkConfig, NetworkSettings
 from replay.stages.network_corrections import NetworkCorrections
 from replay.stages.satellites import Satellites
 
@@ -92,13 +92,20 @@ def station_stages(config: NetworkSettings, layout: Layout) -> list[Stage[Any]]:
     return stages
 
 
-def network_stages(config: NetworkSettings, topics: Collection[str]) -> tuple[Stage[Any], ...]:
-    """All stages before the rover's own filter; only those of the receivers in mode `single`."""
-    if getattr(config, "mode", "network") == "single":
-        return (Satellites(RECEIVER), Satellites(BASE))
+def corrected_stages(config: NetworkSettings, topics: Collection[str]) -> tuple[Stage[Any], ...]:
+    """All stages from observations to the network's corrections of a rover."""
     layout = find_layout(config, topics)
     return (
         Satellites(RECEIVER),
         *station_stages(config, layout),
         NetworkCorrections(layout.stations, layout.baselines),
     )
+
+
+def rover_stages(
+    config: NetworkRtkConfig | NetworkInsConfig, topics: Collection[str]
+) -> tuple[Stage[Any], ...]:
+    """All stages before the rover's own filter; only those of the receivers in mode `single`."""
+    if config.mode == "single":
+        return (Satellites(RECEIVER), Satellites(BASE))
+    return corrected_stages(config, topics)

@@ -17,7 +17,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals, signal_names
-from replay.kernels import elementary, network_ambiguities, network_records, rtk, rtk_records
+from replay.kernels import elementary, network_ambiguities, network_records, rtk_records
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.sights import NOTE_DTYPE
 from replay.log.columns import Columns
@@ -32,7 +32,7 @@ from replay.stages.base import (
 )
 from replay.stages.gnss_columns import event_columns
 from replay.stages.network_config import NetworkSettings
-from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns
+from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns, step_columns
 from replay.stages.spp import excluded_satellites
 from replay.stages.spp_config import WEIGHTINGS
 from replay.stages.waiting import (
@@ -152,21 +152,10 @@ class NetworkAmbiguities:
         return dataclasses.replace(state, **{**arrays, "x": x, "P": P})
 
     def _run(self, state: BaselineState, now: int, wait: int) -> Outputs:
-        count = len(state.epochs)
-        partner = np.full(count, -1, dtype=np.int64)
-        release = np.zeros(count, dtype=np.int64)
-        tolerance = state.times[0]
         # An epoch older than this one's is of no use: both are of one moment or none is.
-        ready = rtk.match_epochs(
-            np.ascontiguousarray(state.epochs["t"]),
-            np.ascontiguousarray(state.epochs["log_t"]),
-            np.ascontiguousarray(state.base_epochs["t"]),
-            np.ascontiguousarray(state.base_epochs["log_t"]),
-            np.zeros(count, dtype=np.int64),
-            now, int(state.released[0]), tolerance, wait, tolerance, partner, release,
-        )  # fmt: skip
+        partner, release, ready = state.match(now, state.times[0], wait, state.times[0])
         if ready == 0:
-            self._forget(state)
+            state.forget_unasked(state.times[0])
             return {}
         epochs = state.epochs[:ready]
         end = int(epochs["first"][-1] + epochs["count"][-1])
@@ -182,11 +171,11 @@ class NetworkAmbiguities:
         )  # fmt: skip
         state.released[0] = release[ready - 1]
         state.forget(ready)
-        self._forget(state)
+        state.forget_unasked(state.times[0])
         of = network_ambiguities
         columns: dict[channels.ChannelSpec, Columns] = {
             channels.NETWORK_AMBIGUITIES: ambiguity_columns(ambiguities[: counts[of.AMBIGUITIES]]),
-            channels.NETWORK_RESOLUTION: _step_columns(steps[: counts[of.STEPS]]),
+            channels.NETWORK_RESOLUTION: step_columns(steps[: counts[of.STEPS]]),
             channels.NETWORK_RESIDUALS: _residual_columns(residuals[: counts[of.RESIDUALS]]),
             channels.NETWORK_EVENTS: event_columns(notes[: counts[of.NOTES]], _EVENT_TEXT),
         }
@@ -195,13 +184,6 @@ class NetworkAmbiguities:
             for channel, rows in columns.items()
             if len(rows)
         }
-
-    @staticmethod
-    def _forget(state: BaselineState) -> None:
-        """Drop epochs of the other station that no epoch can ask for any more."""
-        if len(state.base_epochs):
-            newest = int(state.base_epochs["t"].max())
-            state.forget_base(newest - rtk.LATE_NS - state.times[0])
 
 
 def _growth(tau_s: float, interval_s: float) -> float:
@@ -257,24 +239,6 @@ def _integers_record(config: NetworkSettings, interval_s: float) -> Array:
     record["phase_scale"] = _growth(settings.phase_correlation, interval_s)
     record["least"] = _LEAST
     return record
-
-
-def _step_columns(rows: Array) -> Columns:
-    return Columns.build(
-        rows["t"],
-        {
-            "signal": signal_names(rows["signal"]),
-            "candidate_count": rows["candidates"].astype(np.uint32),
-            "fixed_count": rows["fixed"].astype(np.uint32),
-            "known_count": rows["known"].astype(np.uint32),
-            "ratio": np.ascontiguousarray(rows["ratio"]),
-            "w_ratio": np.ascontiguousarray(rows["w_ratio"]),
-            "threshold": np.ascontiguousarray(rows["threshold"]),
-            "success_rate": np.ascontiguousarray(rows["success"]),
-            "status": rows["status"].astype(np.int32),
-        },
-        log_time_ns=rows["log_t"],
-    )
 
 
 def _residual_columns(rows: Array) -> Columns:

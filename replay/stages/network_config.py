@@ -108,6 +108,10 @@ class NetworkRtkConfig(RtkConfig, frozen=True):
     errors: Errors = Errors()
     interpolation: Interpolation = Interpolation()
 
+    def distance_noise(self) -> float:
+        """What neither the network nor a state of the filter takes off is in the weight."""
+        return _distance_noise(super().distance_noise(), self)
+
 
 class NetworkInsConfig(RtkInsConfig, frozen=True):
     """Settings of `network-ins-tc`; `single` leaves the network out, with the same log."""
@@ -118,6 +122,16 @@ class NetworkInsConfig(RtkInsConfig, frozen=True):
     integers: Integers = Integers()
     errors: Errors = Errors()
     interpolation: Interpolation = Interpolation()
+
+    def distance_noise(self) -> float:
+        """What neither the network nor a state of the filter takes off is in the weight."""
+        return _distance_noise(super().distance_noise(), self)
+
+
+def _distance_noise(own: float, config: NetworkRtkConfig | NetworkInsConfig) -> float:
+    if config.mode == "single" and config.rtk.motion.ionosphere:
+        return own
+    return max(own, config.interpolation.slope)
 
 
 NetworkSettings = NetworkConfig | NetworkRtkConfig | NetworkInsConfig

@@ -165,19 +165,8 @@ class Rtk:
 
     @staticmethod
     def _match(state: RtkState, now: int, *, wait: int) -> tuple[Array, Array, int]:
-        count = len(state.epochs)
-        partner = np.full(count, -1, dtype=np.int64)
-        release = np.zeros(count, dtype=np.int64)
         tolerance, _, max_age = state.times
-        ready = rtk.match_epochs(
-            np.ascontiguousarray(state.epochs["t"]),
-            np.ascontiguousarray(state.epochs["log_t"]),
-            np.ascontiguousarray(state.base_epochs["t"]),
-            np.ascontiguousarray(state.base_epochs["log_t"]),
-            np.ascontiguousarray(state.epochs["needed"]), now, int(state.released[0]), tolerance,
-            wait, max_age, partner, release,
-        )  # fmt: skip
-        return partner, release, ready
+        return state.match(now, tolerance, wait, max_age)
 
     def _run(self, state: RtkState, now: int) -> Outputs:
         partner, release, ready = self._match(state, now, wait=state.times[1])
@@ -186,7 +175,7 @@ class Rtk:
     def _work(self, state: RtkState, ready: int, partner: Array, release: Array) -> Outputs:
         """Work on the first `ready` epochs of those that wait."""
         if ready == 0:
-            self._forget(state)
+            state.forget_unasked(state.times[2])
             return {}
         state.late_corrections(release[:ready])
         epochs = state.epochs[:ready]
@@ -207,7 +196,7 @@ class Rtk:
         )  # fmt: skip
         state.released[0] = release[ready - 1]
         state.forget(ready)
-        self._forget(state)
+        state.forget_unasked(state.times[2])
         columns: dict[channels.ChannelSpec, Columns] = {
             channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[2]]),
             channels.FILTER_GEOMETRY: geometry_columns(solutions[: counts[0]]),
@@ -218,13 +207,6 @@ class Rtk:
             channels.SOLUTION: antenna_solution_columns(solutions[: counts[0]]),
         }
         return {channel.name: rows for channel, rows in columns.items() if len(rows)}
-
-    @staticmethod
-    def _forget(state: RtkState) -> None:
-        """Drop base epochs that no rover epoch can ask for any more."""
-        if len(state.base_epochs):
-            newest = int(state.base_epochs["t"].max())
-            state.forget_base(newest - rtk.LATE_NS - state.times[2])
 
 
 class MovingBaseSatellites(Satellites):
@@ -275,16 +257,12 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array, context: Context
     record["excluded"] = single["excluded"]
     record["slots"] = differences.frequencies
     record["weighting"] = WEIGHTINGS[differences.weighting]
-    for name in ("clock_stability", "baseline_noise", "code_gate", "phase_gate"):
+    for name in ("clock_stability", "code_gate", "phase_gate"):
         record[name] = getattr(differences, name)
     for name in motion.__struct_fields__:
         if name not in ("dynamics", "ionosphere", "troposphere"):
             record[name] = getattr(motion, name)
-    network = getattr(config, "interpolation", None)
-    alone = getattr(config, "mode", "") == "single" and not motion.ionosphere
-    if network is not None and (getattr(config, "mode", "") == "network" or alone):
-        # What no network and no state of the filter takes off is in the weight.
-        record["baseline_noise"] = max(differences.baseline_noise, network.slope)
+    record["baseline_noise"] = config.distance_noise()
     record["gap"] = longest_gap(motion.gap, nominal_interval(context, Port(channels.GNSS_OBS)))
     record["dynamics"] = _DYNAMICS.index(motion.dynamics)
     record["ionosphere"] = int(motion.ionosphere)

@@ -41,19 +41,30 @@ def ambiguity_columns(rows: Array) -> Columns:
 
 def resolution_columns(rows: Array) -> Columns:
     """Columns from records of RESOLUTION_ROW_DTYPE."""
-    return Columns.build(
-        rows["t"],
-        {
-            "candidate_count": rows["candidates"].astype(np.uint32),
-            "fixed_count": rows["fixed"].astype(np.uint32),
-            "ratio": np.ascontiguousarray(rows["ratio"]),
-            "w_ratio": np.ascontiguousarray(rows["w_ratio"]),
-            "threshold": np.ascontiguousarray(rows["threshold"]),
-            "success_rate": np.ascontiguousarray(rows["success"]),
-            "status": rows["status"].astype(np.int32),
-        },
-        log_time_ns=rows["log_t"],
-    )
+    return Columns.build(rows["t"], _attempts(rows), log_time_ns=rows["log_t"])
+
+
+def step_columns(rows: Array) -> Columns:
+    """Columns from records of STEP_ROW_DTYPE."""
+    values = {
+        "signal": signal_names(rows["signal"]),
+        "known_count": rows["known"].astype(np.uint32),
+        **_attempts(rows),
+    }
+    return Columns.build(rows["t"], values, log_time_ns=rows["log_t"])
+
+
+def _attempts(rows: Array) -> dict[str, Any]:
+    """What attempts at integers gave."""
+    return {
+        "candidate_count": rows["candidates"].astype(np.uint32),
+        "fixed_count": rows["fixed"].astype(np.uint32),
+        "ratio": np.ascontiguousarray(rows["ratio"]),
+        "w_ratio": np.ascontiguousarray(rows["w_ratio"]),
+        "threshold": np.ascontiguousarray(rows["threshold"]),
+        "success_rate": np.ascontiguousarray(rows["success"]),
+        "status": rows["status"].astype(np.int32),
+    }
 
 
 def baseline_columns(rows: Array) -> Columns:

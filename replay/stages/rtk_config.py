@@ -102,6 +102,10 @@ class RtkConfig(SppConfig, frozen=True):
     base: Base = Base()
     rtk: Rtk = Rtk()
 
+    def distance_noise(self) -> float:
+        """Deviation of what grows with the distance (m/m), where nothing takes it off."""
+        return self.rtk.differences.baseline_noise
+
 
 class MovingBaseConfig(RtkConfig, frozen=True):
     """Settings of `moving-base`."""

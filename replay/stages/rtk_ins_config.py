@@ -53,3 +53,7 @@ class RtkInsConfig(TightConfig, frozen=True):
     tight: PatientTight = PatientTight()
     base: Base = Base()
     rtk: InertialRtk = InertialRtk()
+
+    def distance_noise(self) -> float:
+        """Deviation of what grows with the distance (m/m), where nothing takes it off."""
+        return self.rtk.differences.baseline_noise

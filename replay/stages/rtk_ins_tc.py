@@ -16,7 +16,8 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import Selection, select_signals
-from replay.kernels import records, rtk, rtk_records, tight_rtk
+from replay.kernels import records, rtk_records, tight_rtk
+from replay.kernels.epoch_matching import LATE_NS
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -157,19 +158,14 @@ class RtkInertial:
         no row: the inertial rows go on, and what they have passed comes too late.
         """
         count = len(state.epochs)
-        partner = np.full(count, -1, dtype=np.int64)
-        release = np.zeros(count, dtype=np.int64)
         base = state.settings.base
         wait = round(base.wait * _NS)
         times = np.concatenate([state.base_epochs["t"], np.full(count, _NEVER)])
         arrivals = np.concatenate([state.base_epochs["log_t"], state.epochs["log_t"] + wait])
         order = np.argsort(arrivals, kind="stable").astype(np.int64)
-        ready = rtk.match_epochs(
-            np.ascontiguousarray(state.epochs["t"]),
-            np.ascontiguousarray(state.epochs["log_t"]),
-            times[order], arrivals[order], np.ascontiguousarray(state.epochs["needed"]),
-            int(state.now[0]), int(state.released[0]), round(base.tolerance * _NS),
-            wait, round(base.max_age * _NS), partner, release,
+        partner, release, ready = state.match_times(
+            times[order], arrivals[order], int(state.now[0]), round(base.tolerance * _NS), wait,
+            round(base.max_age * _NS),
         )  # fmt: skip
         state.late_corrections(release[:ready])
         found = partner >= 0
@@ -216,7 +212,7 @@ class RtkInertial:
         if len(times):
             # Epochs that wait for inertial samples ask for old ones of the base.
             oldest = min(int(times.max()), int(state.epochs["t"].min(initial=times.max())))
-            oldest -= rtk.LATE_NS + round(state.settings.base.max_age * _NS)
+            oldest -= LATE_NS + round(state.settings.base.max_age * _NS)
             state.forget_base(oldest)
         rows, geometry = rows[: counts[1]], geometry[: tally[0]]
         columns: dict[channels.ChannelSpec, Columns] = {

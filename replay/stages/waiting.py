@@ -13,6 +13,7 @@ import numpy as np
 from replay import channels
 from replay.gnss.measurements import Epochs, Selection, characters, gather_epochs
 from replay.kernels import gathering
+from replay.kernels.epoch_matching import LATE_NS, match_epochs
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, NOT_YET
 from replay.log.columns import Columns
 from replay.stages.base import BASE, RECEIVER, Block, Context, Port
@@ -121,6 +122,43 @@ class HeldEpochs:
             first, count = self.epochs["first"][place], self.epochs["count"][place]
             for name in ("network_known", "network", "network_code", "network_std"):
                 self.rows[name][first : first + count] = 0
+
+    def match(
+        self, now_ns: int, tolerance_ns: int, wait_ns: int, max_age_ns: int
+    ) -> tuple[Array, Array, int]:
+        """Base epoch (or minus one) and log time of release of each epoch, and how many are ready.
+
+        See :func:`replay.kernels.epoch_matching.match_epochs`.
+        """
+        return self.match_times(
+            self.base_epochs["t"],
+            self.base_epochs["log_t"],
+            now_ns,
+            tolerance_ns,
+            wait_ns,
+            max_age_ns,
+        )
+
+    def match_times(
+        self, base_t: Array, base_log: Array, now_ns: int, tolerance_ns: int, wait_ns: int,
+        max_age_ns: int,
+    ) -> tuple[Array, Array, int]:  # fmt: skip
+        """The same with base epochs of given valid and log times."""
+        count = len(self.epochs)
+        partner = np.full(count, -1, dtype=np.int64)
+        release = np.zeros(count, dtype=np.int64)
+        ready = match_epochs(
+            np.ascontiguousarray(self.epochs["t"]), np.ascontiguousarray(self.epochs["log_t"]),
+            np.ascontiguousarray(base_t), np.ascontiguousarray(base_log),
+            np.ascontiguousarray(self.epochs["needed"]), now_ns, int(self.released[0]),
+            tolerance_ns, wait_ns, max_age_ns, partner, release,
+        )  # fmt: skip
+        return partner, release, ready
+
+    def forget_unasked(self, max_age_ns: int) -> None:
+        """Drop base epochs that no epoch of the rover can ask for any more."""
+        if len(self.base_epochs):
+            self.forget_base(int(self.base_epochs["t"].max()) - LATE_NS - max_age_ns)
 
     def forget(self, count: int) -> None:
         """Drop the rover's first epochs."""
