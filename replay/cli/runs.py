@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from replay.cli.app import app, err, leave, out, say, warn
-from replay.cli.arguments import Output
+from replay.cli.arguments import Output, read_toml
 from replay.cli.events import event_summary
 from replay.errors import ExitCode, UsageError
 
@@ -61,10 +60,7 @@ def run(
         raise UsageError("--checkpoint-every is a number of seconds, 0 or more")
     tables = []
     if config is not None:
-        try:
-            tables.append(tomllib.loads(config.read_text()))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise UsageError(f"not TOML: {error}", where=str(config)) from error
+        tables.append(read_toml(config))
     tables.append(parse_assignments(settings or []))
     with LogReader(log) as reader:
         job = make_job(

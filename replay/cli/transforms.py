@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from replay.cli.app import app, leave, say, warn
-from replay.cli.arguments import Output
+from replay.cli.arguments import Output, read_toml
 from replay.cli.runs import ShowProgress, progress_bar
-from replay.errors import UsageError
 
 if TYPE_CHECKING:
     from replay.engine.transforms import Transform
@@ -109,8 +107,5 @@ def _settings(words: dict[str, Any], config: Path | None) -> Transform:
             words[name] = comma_separated(words[name])
     tables: list[dict[str, Any]] = [words]
     if config is not None:
-        try:
-            tables.insert(0, tomllib.loads(config.read_text()))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise UsageError(f"not TOML: {error}", where=str(config)) from error
+        tables.insert(0, read_toml(config))
     return build(Transform, tables)

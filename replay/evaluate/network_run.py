@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,9 +31,9 @@ from replay.evaluate.network_residuals import (
     residual_figures,
     rover_residuals,
 )
-from replay.evaluate.read import Metadata, RunChannels, own_run, run_names
+from replay.evaluate.read import Metadata, RunChannels, own_run, read_channels, run_names
 from replay.evaluate.status import updated
-from replay.log.columns import Columns, concatenate
+from replay.log.columns import Columns
 from replay.log.reader import LogReader
 from replay.time import NS_PER_S
 
@@ -172,7 +172,7 @@ def read_network_run(
                 where=str(run_log),
                 mend=f"it has solutions of {', '.join(known) or 'none'}",
             )
-        found = _read_all(
+        found = read_channels(
             reader,
             (
                 channels.SOLUTION.at(run=name),
@@ -233,22 +233,6 @@ def _configuration(metadata: Metadata, where: str) -> dict[str, Any]:
     return tomllib.loads(read_manifest(metadata, where).configuration)
 
 
-def _read_all(
-    reader: LogReader, topics: Iterable[str], kinds: Iterable[channels.ChannelSpec]
-) -> dict[str, Columns]:
-    """Channels of those topics and kinds that the log has, in one pass through it."""
-    chosen = [topic for topic in topics if topic in reader.channels]
-    kinds = tuple(kinds)
-    chosen += [t for t in sorted(reader.channels) if any(spec.matches(t) for spec in kinds)]
-    parts: dict[str, list[Columns]] = {topic: [] for topic in chosen}
-    for batch in reader.batches(chosen):
-        for topic, columns in batch.items():
-            parts[topic].append(columns)
-    return {
-        topic: concatenate(found) if found else reader.read(topic) for topic, found in parts.items()
-    }
-
-
 def _by_part(
     found: Mapping[str, Columns], spec: channels.ChannelSpec, part: str
 ) -> dict[str, Columns]:
@@ -303,7 +287,7 @@ def read_stations(run_log: Path) -> StationFigures:
     """Figures of the stations of a log, which needs no rover."""
     with LogReader(run_log) as reader:
         kinds = (channels.NETWORK_AMBIGUITIES, channels.SIGNAL_TRUTH)
-        found = _read_all(reader, (), kinds)
+        found = read_channels(reader, (), kinds)
     return station_figures(
         _by_part(found, channels.NETWORK_AMBIGUITIES, "baseline"),
         _by_part(found, channels.SIGNAL_TRUTH, "receiver"),

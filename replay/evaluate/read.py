@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -83,23 +83,44 @@ def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
                 mend="import or simulate the input with truth and run again",
             )
 
-        def optional(spec: channels.ChannelSpec) -> Columns | None:
-            topic = spec.at(run=name)
-            return reader.read(topic) if topic in topics else None
-
-        fixes = [reader.read(topic) for topic in topics if channels.GNSS_FIX.matches(topic)]
+        optional = (
+            channels.FILTER_INNOVATIONS,
+            channels.FILTER_GEOMETRY,
+            channels.FILTER_RESOLUTION,
+        )
+        of_run = {spec.name: spec.at(run=name) for spec in (channels.SOLUTION, *optional)}
+        found = read_channels(
+            reader, (*of_run.values(), channels.TRUTH.topic), (channels.GNSS_FIX,)
+        )
+        fixes = [found[topic] for topic in topics if channels.GNSS_FIX.matches(topic)]
         return RunChannels(
             run=name,
-            solution=reader.read(channels.SOLUTION.at(run=name)),
-            truth=reader.read(channels.TRUTH.topic),
-            innovations=optional(channels.FILTER_INNOVATIONS),
+            solution=found[of_run["SOLUTION"]],
+            truth=found[channels.TRUTH.topic],
+            innovations=found.get(of_run["FILTER_INNOVATIONS"]),
             fixes=concatenate(fixes) if fixes else None,
-            geometry=optional(channels.FILTER_GEOMETRY),
-            resolution=optional(channels.FILTER_RESOLUTION),
+            geometry=found.get(of_run["FILTER_GEOMETRY"]),
+            resolution=found.get(of_run["FILTER_RESOLUTION"]),
             observations_ns=_observation_times(reader, topics),
             antenna_arm_m=_antenna_arm(reader.metadata),
             metadata={key: dict(values) for key, values in reader.metadata.items()},
         )
+
+
+def read_channels(
+    reader: LogReader, topics: Iterable[str], kinds: Iterable[channels.ChannelSpec] = ()
+) -> dict[str, Columns]:
+    """Channels of those topics and kinds that the log has, in one pass through it."""
+    chosen = [topic for topic in topics if topic in reader.channels]
+    kinds = tuple(kinds)
+    chosen += [t for t in sorted(reader.channels) if any(spec.matches(t) for spec in kinds)]
+    parts: dict[str, list[Columns]] = {topic: [] for topic in chosen}
+    for batch in reader.batches(chosen):
+        for topic, columns in batch.items():
+            parts[topic].append(columns)
+    return {
+        topic: concatenate(found) if found else reader.read(topic) for topic, found in parts.items()
+    }
 
 
 def run_names(topics: list[str]) -> list[str]:

@@ -8,27 +8,22 @@ take logarithms from a library that differs between machines.
 
 from __future__ import annotations
 
-import hashlib
 import math
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from replay.draws import stream
 from replay.kernels import elementary
 from replay.kernels.noise import gauss_markov
 from replay.kernels.noise import normals as normals_of_uniforms
 
 Floats = npt.NDArray[np.float64]
 
-_KEY_BYTES: Final = 16
-
 
 def uniforms(seed: int, source: str, count: int) -> Floats:
     """Uniform numbers in [0, 1) of one source, shape (count,)."""
-    key = hashlib.sha256(f"{seed}:{source}".encode()).digest()[:_KEY_BYTES]
-    generator = np.random.Generator(np.random.Philox(key=int.from_bytes(key, "little")))
-    return generator.random(count)
+    return stream(f"{seed}:{source}").random(count)
 
 
 def normals(seed: int, source: str, rows: int, columns: int = 3) -> Floats:

@@ -8,17 +8,14 @@ A row takes the same share of its stream however the log is cut into batches.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from replay.draws import stream
 from replay.engine.transforms.settings import NoiseTerm
 from replay.kernels.noise import normals
 from replay.log.columns import Columns
-
-_KEY_BYTES: Final = 16
 
 
 class Noise:
@@ -40,9 +37,7 @@ class Noise:
     def __init__(self, term: NoiseTerm, seed: int, earlier: int) -> None:
         self.term = term
         self.changed = 0
-        name = f"{seed}:{earlier}:{term.topic}:{term.field}"
-        key = hashlib.sha256(name.encode()).digest()[:_KEY_BYTES]
-        self._generator = np.random.Generator(np.random.Philox(key=int.from_bytes(key, "little")))
+        self._generator = stream(f"{seed}:{earlier}:{term.topic}:{term.field}")
 
     def apply(self, batch: dict[str, Columns]) -> dict[str, Columns]:
         """The batch with noise on its rows of the term's topic."""
