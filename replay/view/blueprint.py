@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from replay.evaluate.geometry import Floats
 from replay.time import to_datetime64
 from replay.view.labels import SIGMA, TIMES
-from replay.view.network_scene import Stations
+from replay.view.network_scene import DRAWN, Stations
 from replay.view.panels import Panel, Section
 from replay.view.scene import ELLIPSOID_SIGMAS, Scene
 from replay.view.sink import TIMELINE, entity
@@ -253,10 +253,19 @@ def _scene_views(scene: Scene, map_height: float) -> list[rrb.View]:
     east, north, _ = np.maximum(scene.high_m - scene.low_m, _SMALLEST_PLAN_M)
     spacing = 10.0 ** np.floor(np.log10(max(east, north) / 2.0))
     views: list[rrb.View] = [
-        rrb.MapView(origin="/map", name="Map", zoom=_map_zoom(east, north, scene, map_height)),
+        rrb.MapView(
+            origin="/map",
+            contents=["$origin/**", *_without_stations("/map")],
+            name="Map",
+            zoom=_map_zoom(east, north, scene, map_height),
+        ),
         rrb.Spatial3DView(
             origin="/world",
-            contents=["$origin/**", *(f"- /{entity(body)}/**" for body in scene.bodies)],
+            contents=[
+                "$origin/**",
+                *(f"- /{entity(body)}/**" for body in scene.bodies),
+                *_without_stations("/world"),
+            ],
             name=f"Plan, local east-north-up [m], north up, grid {spacing:g} m",
             line_grid=rrb.LineGrid3D(visible=True, spacing=spacing),
             eye_controls=plan_eye(scene.low_m, scene.high_m),
@@ -269,7 +278,7 @@ def _scene_views(scene: Scene, map_height: float) -> list[rrb.View]:
         views.append(
             rrb.Spatial3DView(
                 origin=place,
-                contents=["/world/**", "- /world/names"],
+                contents=["/world/**", "- /world/names", *_without_stations("/world")],
                 name=f"{what} {ELLIPSOID_SIGMAS:g}{SIGMA} ellipsoid{scale}, moving along",
                 line_grid=rrb.LineGrid3D(visible=True, spacing=1.0),
                 eye_controls=rrb.EyeControls3D(
@@ -281,6 +290,11 @@ def _scene_views(scene: Scene, map_height: float) -> list[rrb.View]:
             )
         )
     return views
+
+
+def _without_stations(root: str) -> list[str]:
+    """Reference stations are some ten kilometres away: a map of them is no map of the path."""
+    return [f"- {root}/{name}" for name in DRAWN]
 
 
 def plan_eye(low_m: Floats, high_m: Floats) -> rrb.EyeControls3D:

@@ -18,6 +18,8 @@ from replay.view.scene import Scene
 from replay.view.sink import Sink, radius, rgba
 
 STATION: Final = Ink((255, 176, 32), (214, 128, 0))
+DRAWN: Final = ("stations", "baselines")
+"""Entities below `map` and `world` that are of stations alone."""
 _ROOM: Final = 0.06
 
 
