@@ -270,6 +270,13 @@ CORRECTIONS: Final = ChannelSpec(
         "wet_mapping": Tolerance(1e-6, "1"),
         "shapiro_m": _M,
         "antenna_m": _M,
+        "satellite_antenna_m": _M,
+        "solid_tide_m": _M,
+        "pole_tide_m": _M,
+        "ocean_loading_m": _M,
+        "wind_up_m": _M,
+        "phase_bias_m": _M,
+        "higher_ionosphere_m": _M,
     },
 )
 COARSE: Final = ChannelSpec(
@@ -448,6 +455,18 @@ FILTER_COVARIANCE: Final = ChannelSpec(
     "covariance of a filter's error states after each epoch",
     tolerances={"upper_triangle": Tolerance(1e-6, "1", Difference.COVARIANCE)},
 )
+FILTER_TRANSITION: Final = ChannelSpec(
+    "FILTER_TRANSITION",
+    "/filter/{run}/transition",
+    "replay.FilterTransition",
+    "how a filter came from update to update, for a smoother",
+    tolerances={
+        "value": Tolerance(1e-9, "1"),
+        "predicted_upper_triangle": Tolerance(1e-6, "1"),
+        "correction": Tolerance(1e-6, "1"),
+        "updated_upper_triangle": Tolerance(1e-6, "1"),
+    },
+)
 FILTER_INNOVATIONS: Final = ChannelSpec(
     "FILTER_INNOVATIONS",
     "/filter/{run}/innovations",
@@ -501,11 +520,53 @@ FILTER_GEOMETRY: Final = ChannelSpec(
         )
     },
 )
+FILTER_TROPOSPHERE: Final = ChannelSpec(
+    "FILTER_TROPOSPHERE",
+    "/filter/{run}/troposphere",
+    "replay.ZenithDelay",
+    "delay of the troposphere in the zenith, estimated",
+    tolerances={
+        name: _M
+        for name in (
+            "hydrostatic_m",
+            "wet_m",
+            "wet_std_m",
+            "gradient_north_m",
+            "gradient_north_std_m",
+            "gradient_east_m",
+            "gradient_east_std_m",
+        )
+    },
+)
+FILTER_IONOSPHERE: Final = ChannelSpec(
+    "FILTER_IONOSPHERE",
+    "/filter/{run}/ionosphere",
+    "replay.SlantIonosphere",
+    "slant delays of the ionosphere, estimated",
+    key=("satellite",),
+    tolerances={"delay_m": _M, "delay_std_m": _M},
+)
+FILTER_BIASES: Final = ChannelSpec(
+    "FILTER_BIASES",
+    "/filter/{run}/receiver_biases",
+    "replay.ReceiverBias",
+    "biases of the receiver between codes, estimated",
+    key=("system", "signal"),
+    tolerances={"bias_m": _M, "bias_std_m": _M},
+)
+FILTER_PHASES: Final = ChannelSpec(
+    "FILTER_PHASES",
+    "/filter/{run}/phases",
+    "replay.PhaseAmbiguity",
+    "ambiguities of carrier phases, estimated",
+    key=("satellite", "signal"),
+    tolerances={"ambiguity_m": _M, "ambiguity_std_m": _M},
+)
 FILTER_AMBIGUITIES: Final = ChannelSpec(
     "FILTER_AMBIGUITIES",
     "/filter/{run}/ambiguities",
     "replay.DoubleDifferenceAmbiguity",
-    "double-difference ambiguities, real and integer",
+    "ambiguities as differences to a reference satellite, real and integer",
     key=("satellite", "signal"),
     tolerances={
         "float_cycles": Tolerance(1e-4, "cycle"),
@@ -604,11 +665,16 @@ CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     FILTER_INNOVATIONS,
     FILTER_CLOCKS,
     FILTER_GEOMETRY,
+    FILTER_TROPOSPHERE,
+    FILTER_IONOSPHERE,
+    FILTER_BIASES,
+    FILTER_PHASES,
     FILTER_AMBIGUITIES,
     FILTER_RESOLUTION,
     RELATIVE_POSITION,
     FILTER_STATE,
     FILTER_COVARIANCE,
+    FILTER_TRANSITION,
     FILTER_EVENTS,
     SOLUTION,
     TRACE,

@@ -51,7 +51,18 @@ _CORRECTED: Final = (
     "wet_mapping",
     "shapiro_m",
 )
-_ANTENNA: Final = "antenna_m"
+# Each adds so many times to the code, and to the phase.
+_FURTHER: Final = {
+    "antenna_m": (1.0, 1.0),
+    "satellite_antenna_m": (1.0, 1.0),
+    "solid_tide_m": (1.0, 1.0),
+    "pole_tide_m": (1.0, 1.0),
+    "ocean_loading_m": (1.0, 1.0),
+    "wind_up_m": (0.0, 1.0),
+    "phase_bias_m": (0.0, 1.0),
+    "higher_ionosphere_m": (1.0, -0.5),
+}
+_PHASE_BIAS: Final = "phase_bias_m"
 SATELLITE_NAMES: Final = np.array(
     [
         f"{letter}{prn:02d}"
@@ -258,12 +269,23 @@ def gather_epochs(
 
 
 def _corrected(corrections: Columns) -> Array:
-    """Terms `(n, 12)` as the compiled loop reads them; the antenna's is 0 where it is absent."""
-    terms = np.zeros((len(corrections), len(_CORRECTED) + 1))
+    """Terms `(n, 14)` as the compiled loop reads them; what is absent adds nothing."""
+    code = len(_CORRECTED)
+    terms = np.zeros((len(corrections), code + 3))
     for place, name in enumerate(_CORRECTED):
         terms[:, place] = corrections[name]
-    if _ANTENNA in corrections.values:
-        terms[:, -1] = np.where(corrections.is_present(_ANTENNA), corrections[_ANTENNA], 0.0)
+    for name, (on_code, on_phase) in _FURTHER.items():
+        if name not in corrections.values:
+            continue
+        there = corrections.is_present(name)
+        if not there.any():
+            continue
+        value = np.where(there, corrections[name], 0.0)
+        if on_code:
+            terms[:, code] += on_code * value
+        terms[:, code + 1] += on_phase * value
+        if name == _PHASE_BIAS:
+            terms[:, code + 2] = there
     return terms
 
 

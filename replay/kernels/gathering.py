@@ -249,9 +249,10 @@ def join_corrections(
     t, log_t : int64 arrays (n,), ns
     satellite : uint8 array (n, 3)
     signal : uint8 array (n, 2)
-    values : float64 array (n, 12)
-        Fields of `replay.SignalCorrections` from `distance_m` to `antenna_m`, the last 0 where
-        the antenna is not modelled.
+    values : float64 array (n, 14)
+        Fields of `replay.SignalCorrections` from `distance_m` to `shapiro_m`; what else adds
+        to the code and what to the phase, taken off both here; 1 where the phase's bias is
+        known.
     """
     i = 0
     n = t.shape[0]
@@ -270,7 +271,8 @@ def join_corrections(
                     for slot in range(SLOTS):
                         if row["signal"][slot] == code:
                             row["code"][slot] -= values[p, 11]
-                            row["phase"][slot] -= values[p, 11]
+                            row["phase"][slot] -= values[p, 12]
+                            row["phase_known"][slot] = 1 if values[p, 13] == 1.0 else 0
                             row["group_delay"][slot] = values[p, 4]
                             row["ionosphere"][slot] = values[p, 5]
                             row["distance"] = values[p, 0]

@@ -82,6 +82,7 @@ MEASURED_DTYPE: Final = np.dtype(
         ("hydrostatic_mapping", "<f8"),
         ("wet_mapping", "<f8"),
         ("shapiro", "<f8"),  # m, 0 where not modelled
+        ("phase_known", "<i8", SLOTS),  # 1: the satellite's bias of the phase is known, and off
         # From a network of stations, known where `network_known` is 1, else 0.
         ("network_known", "<i8", SLOTS),
         ("network", "<f8", SLOTS),  # m, error of the phase against the master's

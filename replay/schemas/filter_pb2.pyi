@@ -23,6 +23,7 @@ class MeasurementKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     MEASUREMENT_KIND_DOPPLER: _ClassVar[MeasurementKind]
     MEASUREMENT_KIND_TIME_DIFFERENCED_PHASE: _ClassVar[MeasurementKind]
     MEASUREMENT_KIND_DISPLACEMENT: _ClassVar[MeasurementKind]
+    MEASUREMENT_KIND_IONOSPHERE: _ClassVar[MeasurementKind]
 
 class MeasurementAxis(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -74,6 +75,7 @@ MEASUREMENT_KIND_CARRIER_PHASE: MeasurementKind
 MEASUREMENT_KIND_DOPPLER: MeasurementKind
 MEASUREMENT_KIND_TIME_DIFFERENCED_PHASE: MeasurementKind
 MEASUREMENT_KIND_DISPLACEMENT: MeasurementKind
+MEASUREMENT_KIND_IONOSPHERE: MeasurementKind
 MEASUREMENT_AXIS_NONE: MeasurementAxis
 MEASUREMENT_AXIS_EAST: MeasurementAxis
 MEASUREMENT_AXIS_NORTH: MeasurementAxis
@@ -141,6 +143,30 @@ class FilterCovariance(_message.Message):
     state_names: str
     upper_triangle: _containers.RepeatedScalarFieldContainer[float]
     def __init__(self, dimension: _Optional[int] = ..., state_names: _Optional[str] = ..., upper_triangle: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class FilterTransition(_message.Message):
+    __slots__ = ("since_ns", "dimension_before", "dimension", "state_names", "row", "column", "value", "predicted_upper_triangle", "correction", "updated_upper_triangle")
+    SINCE_NS_FIELD_NUMBER: _ClassVar[int]
+    DIMENSION_BEFORE_FIELD_NUMBER: _ClassVar[int]
+    DIMENSION_FIELD_NUMBER: _ClassVar[int]
+    STATE_NAMES_FIELD_NUMBER: _ClassVar[int]
+    ROW_FIELD_NUMBER: _ClassVar[int]
+    COLUMN_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    PREDICTED_UPPER_TRIANGLE_FIELD_NUMBER: _ClassVar[int]
+    CORRECTION_FIELD_NUMBER: _ClassVar[int]
+    UPDATED_UPPER_TRIANGLE_FIELD_NUMBER: _ClassVar[int]
+    since_ns: int
+    dimension_before: int
+    dimension: int
+    state_names: str
+    row: _containers.RepeatedScalarFieldContainer[int]
+    column: _containers.RepeatedScalarFieldContainer[int]
+    value: _containers.RepeatedScalarFieldContainer[float]
+    predicted_upper_triangle: _containers.RepeatedScalarFieldContainer[float]
+    correction: _containers.RepeatedScalarFieldContainer[float]
+    updated_upper_triangle: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, since_ns: _Optional[int] = ..., dimension_before: _Optional[int] = ..., dimension: _Optional[int] = ..., state_names: _Optional[str] = ..., row: _Optional[_Iterable[int]] = ..., column: _Optional[_Iterable[int]] = ..., value: _Optional[_Iterable[float]] = ..., predicted_upper_triangle: _Optional[_Iterable[float]] = ..., correction: _Optional[_Iterable[float]] = ..., updated_upper_triangle: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Innovation(_message.Message):
     __slots__ = ("kind", "axis", "satellite", "signal", "innovation", "innovation_std", "measurement_std", "normalized", "accepted")

@@ -80,7 +80,7 @@ class CoarsePosition(_message.Message):
     def __init__(self, position_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., clock_offset_m: _Optional[float] = ..., age_s: _Optional[float] = ..., satellite_count: _Optional[int] = ...) -> None: ...
 
 class SignalCorrections(_message.Message):
-    __slots__ = ("satellite", "signal", "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m", "ionosphere_m", "hydrostatic_m", "wet_m", "hydrostatic_mapping", "wet_mapping", "shapiro_m", "antenna_m")
+    __slots__ = ("satellite", "signal", "distance_m", "sagnac_m", "satellite_clock_m", "relativity_m", "group_delay_m", "ionosphere_m", "hydrostatic_m", "wet_m", "hydrostatic_mapping", "wet_mapping", "shapiro_m", "antenna_m", "satellite_antenna_m", "solid_tide_m", "pole_tide_m", "ocean_loading_m", "wind_up_m", "phase_bias_m", "higher_ionosphere_m")
     SATELLITE_FIELD_NUMBER: _ClassVar[int]
     SIGNAL_FIELD_NUMBER: _ClassVar[int]
     DISTANCE_M_FIELD_NUMBER: _ClassVar[int]
@@ -95,6 +95,13 @@ class SignalCorrections(_message.Message):
     WET_MAPPING_FIELD_NUMBER: _ClassVar[int]
     SHAPIRO_M_FIELD_NUMBER: _ClassVar[int]
     ANTENNA_M_FIELD_NUMBER: _ClassVar[int]
+    SATELLITE_ANTENNA_M_FIELD_NUMBER: _ClassVar[int]
+    SOLID_TIDE_M_FIELD_NUMBER: _ClassVar[int]
+    POLE_TIDE_M_FIELD_NUMBER: _ClassVar[int]
+    OCEAN_LOADING_M_FIELD_NUMBER: _ClassVar[int]
+    WIND_UP_M_FIELD_NUMBER: _ClassVar[int]
+    PHASE_BIAS_M_FIELD_NUMBER: _ClassVar[int]
+    HIGHER_IONOSPHERE_M_FIELD_NUMBER: _ClassVar[int]
     satellite: str
     signal: str
     distance_m: float
@@ -109,7 +116,14 @@ class SignalCorrections(_message.Message):
     wet_mapping: float
     shapiro_m: float
     antenna_m: float
-    def __init__(self, satellite: _Optional[str] = ..., signal: _Optional[str] = ..., distance_m: _Optional[float] = ..., sagnac_m: _Optional[float] = ..., satellite_clock_m: _Optional[float] = ..., relativity_m: _Optional[float] = ..., group_delay_m: _Optional[float] = ..., ionosphere_m: _Optional[float] = ..., hydrostatic_m: _Optional[float] = ..., wet_m: _Optional[float] = ..., hydrostatic_mapping: _Optional[float] = ..., wet_mapping: _Optional[float] = ..., shapiro_m: _Optional[float] = ..., antenna_m: _Optional[float] = ...) -> None: ...
+    satellite_antenna_m: float
+    solid_tide_m: float
+    pole_tide_m: float
+    ocean_loading_m: float
+    wind_up_m: float
+    phase_bias_m: float
+    higher_ionosphere_m: float
+    def __init__(self, satellite: _Optional[str] = ..., signal: _Optional[str] = ..., distance_m: _Optional[float] = ..., sagnac_m: _Optional[float] = ..., satellite_clock_m: _Optional[float] = ..., relativity_m: _Optional[float] = ..., group_delay_m: _Optional[float] = ..., ionosphere_m: _Optional[float] = ..., hydrostatic_m: _Optional[float] = ..., wet_m: _Optional[float] = ..., hydrostatic_mapping: _Optional[float] = ..., wet_mapping: _Optional[float] = ..., shapiro_m: _Optional[float] = ..., antenna_m: _Optional[float] = ..., satellite_antenna_m: _Optional[float] = ..., solid_tide_m: _Optional[float] = ..., pole_tide_m: _Optional[float] = ..., ocean_loading_m: _Optional[float] = ..., wind_up_m: _Optional[float] = ..., phase_bias_m: _Optional[float] = ..., higher_ionosphere_m: _Optional[float] = ...) -> None: ...
 
 class CycleSlip(_message.Message):
     __slots__ = ("satellite", "signal", "detector", "statistic", "threshold", "size_cycles", "repaired")
@@ -248,3 +262,57 @@ class RelativePosition(_message.Message):
     base_age_s: float
     status: _solution_pb2.SolutionStatus
     def __init__(self, baseline_ecef_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., baseline_enu_m: _Optional[_Union[_geometry_pb2.Vector3, _Mapping]] = ..., covariance_enu_m2: _Optional[_Union[_geometry_pb2.SymmetricMatrix3, _Mapping]] = ..., length_m: _Optional[float] = ..., length_std_m: _Optional[float] = ..., heading_rad: _Optional[float] = ..., heading_std_rad: _Optional[float] = ..., pitch_rad: _Optional[float] = ..., pitch_std_rad: _Optional[float] = ..., base_age_s: _Optional[float] = ..., status: _Optional[_Union[_solution_pb2.SolutionStatus, str]] = ...) -> None: ...
+
+class ZenithDelay(_message.Message):
+    __slots__ = ("hydrostatic_m", "wet_m", "wet_std_m", "gradient_north_m", "gradient_north_std_m", "gradient_east_m", "gradient_east_std_m")
+    HYDROSTATIC_M_FIELD_NUMBER: _ClassVar[int]
+    WET_M_FIELD_NUMBER: _ClassVar[int]
+    WET_STD_M_FIELD_NUMBER: _ClassVar[int]
+    GRADIENT_NORTH_M_FIELD_NUMBER: _ClassVar[int]
+    GRADIENT_NORTH_STD_M_FIELD_NUMBER: _ClassVar[int]
+    GRADIENT_EAST_M_FIELD_NUMBER: _ClassVar[int]
+    GRADIENT_EAST_STD_M_FIELD_NUMBER: _ClassVar[int]
+    hydrostatic_m: float
+    wet_m: float
+    wet_std_m: float
+    gradient_north_m: float
+    gradient_north_std_m: float
+    gradient_east_m: float
+    gradient_east_std_m: float
+    def __init__(self, hydrostatic_m: _Optional[float] = ..., wet_m: _Optional[float] = ..., wet_std_m: _Optional[float] = ..., gradient_north_m: _Optional[float] = ..., gradient_north_std_m: _Optional[float] = ..., gradient_east_m: _Optional[float] = ..., gradient_east_std_m: _Optional[float] = ...) -> None: ...
+
+class SlantIonosphere(_message.Message):
+    __slots__ = ("satellite", "delay_m", "delay_std_m")
+    SATELLITE_FIELD_NUMBER: _ClassVar[int]
+    DELAY_M_FIELD_NUMBER: _ClassVar[int]
+    DELAY_STD_M_FIELD_NUMBER: _ClassVar[int]
+    satellite: str
+    delay_m: float
+    delay_std_m: float
+    def __init__(self, satellite: _Optional[str] = ..., delay_m: _Optional[float] = ..., delay_std_m: _Optional[float] = ...) -> None: ...
+
+class ReceiverBias(_message.Message):
+    __slots__ = ("system", "signal", "bias_m", "bias_std_m")
+    SYSTEM_FIELD_NUMBER: _ClassVar[int]
+    SIGNAL_FIELD_NUMBER: _ClassVar[int]
+    BIAS_M_FIELD_NUMBER: _ClassVar[int]
+    BIAS_STD_M_FIELD_NUMBER: _ClassVar[int]
+    system: str
+    signal: str
+    bias_m: float
+    bias_std_m: float
+    def __init__(self, system: _Optional[str] = ..., signal: _Optional[str] = ..., bias_m: _Optional[float] = ..., bias_std_m: _Optional[float] = ...) -> None: ...
+
+class PhaseAmbiguity(_message.Message):
+    __slots__ = ("satellite", "signal", "ambiguity_m", "ambiguity_std_m", "epoch_count")
+    SATELLITE_FIELD_NUMBER: _ClassVar[int]
+    SIGNAL_FIELD_NUMBER: _ClassVar[int]
+    AMBIGUITY_M_FIELD_NUMBER: _ClassVar[int]
+    AMBIGUITY_STD_M_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_COUNT_FIELD_NUMBER: _ClassVar[int]
+    satellite: str
+    signal: str
+    ambiguity_m: float
+    ambiguity_std_m: float
+    epoch_count: int
+    def __init__(self, satellite: _Optional[str] = ..., signal: _Optional[str] = ..., ambiguity_m: _Optional[float] = ..., ambiguity_std_m: _Optional[float] = ..., epoch_count: _Optional[int] = ...) -> None: ...

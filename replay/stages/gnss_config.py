@@ -42,14 +42,14 @@ class Orbits(Section, frozen=True):
 class Atmosphere(Section, frozen=True):
     """What is modelled on the way of the signal."""
 
-    ionosphere: Literal["none", "klobuchar", "system"] = "klobuchar"
+    ionosphere: Literal["none", "klobuchar", "system", "map"] = "klobuchar"
     alpha: tuple[
         Annotated[float, quantity("1", "Klobuchar, s/semicircle^n, where the log has none")], ...
     ] = (0.0, 0.0, 0.0, 0.0)
     beta: tuple[
         Annotated[float, quantity("1", "Klobuchar, s/semicircle^n, where the log has none")], ...
     ] = (0.0, 0.0, 0.0, 0.0)
-    troposphere: Literal["none", "niell", "cosecant"] = "niell"
+    troposphere: Literal["none", "niell", "cosecant", "gmf"] = "niell"
     meteorology: Literal["standard", "mops", "gpt"] = "standard"
     humidity: Annotated[float, quantity("1", "relative, at every height; not of mops")] = 0.7
     shapiro: bool = True

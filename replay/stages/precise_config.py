@@ -1,0 +1,47 @@
+"""Settings of precise orbits, clocks and biases, and of what is corrected with them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from replay.configuration import Section, quantity
+from replay.stages.gnss_config import Atmosphere
+from replay.stages.spp_config import SppConfig
+
+
+class Products(Section, frozen=True):
+    """Where orbits and clocks come from, and how they are interpolated."""
+
+    source: Literal["precise", "broadcast"] = "precise"
+    degree: int = 10
+    beyond: Annotated[float, quantity("s", "past its last epoch that an orbit serves")] = 900.0
+    clock_beyond: Annotated[float, quantity("s", "past its last epoch that a clock serves")] = 60.0
+    biases: bool = True  # use biases of signals where the log has them
+    attitude: Literal["model", "nominal"] = "model"
+
+
+class Terms(Section, frozen=True):
+    """Which terms are corrected where the log allows."""
+
+    satellite_antenna: bool = True
+    wind_up: bool = True
+    solid_tide: bool = True
+    pole_tide: bool = True
+    ocean_loading: bool = True
+    higher_ionosphere: bool = False
+
+
+class PreciseAtmosphere(Atmosphere, frozen=True):
+    """The filter estimates the ionosphere: what is modelled is a beginning at most."""
+
+    ionosphere: Literal["none", "klobuchar", "system", "map"] = "none"
+    troposphere: Literal["none", "niell", "cosecant", "gmf"] = "gmf"
+    meteorology: Literal["standard", "mops", "gpt"] = "gpt"
+
+
+class PreciseConfig(SppConfig, frozen=True):
+    """Settings that pipelines with precise products share."""
+
+    atmosphere: PreciseAtmosphere = PreciseAtmosphere()
+    products: Products = Products()
+    terms: Terms = Terms()
