@@ -22,6 +22,8 @@ DEGRADE: Final = "replay.degrade"
 GAP_INTERVALS: Final = 3.0  # one or two lost fixes are no outage
 GAP_LEAST_S: Final = 2.0
 _FEWEST_UPDATES: Final = 2
+# Spans are told by the receiver's clock and solutions by true time: apart by no more than this.
+_CLOCK_NS: Final = 10_000_000
 
 
 @dataclasses.dataclass(frozen=True, slots=True, order=True)
@@ -215,7 +217,7 @@ def _drift_row(span: Span, solution: Columns, update_times_ns: Rows) -> tuple[in
     """
     times = solution.valid_time_ns
     # A cut span leaves out fixes at its start and keeps those at its end, a gap keeps both.
-    after = update_times_ns[update_times_ns >= span.end_ns]
+    after = update_times_ns[update_times_ns >= span.end_ns - _CLOCK_NS]
     if len(after) == 0:
         row = len(times) - 1
     else:

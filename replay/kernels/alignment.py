@@ -51,6 +51,7 @@ _HALF_TURN_RAD = 3.141592653589793
 _GUARD_BLOCKS = 2
 _LARGEST_BIAS_RAD_S = 0.05  # 3 deg/s: what a gyro at rest may show
 _RECENT_FIX_S = 2.0
+_SET_OUT_M_S = 0.5  # since the last rest; what it gains steadily after that is no rest
 _TURN_WINDOW_S = 0.2  # long enough to average an engine's shaking
 _MOVING_TILT_FACTOR = 4.0  # levelling in motion is that much worse than at rest
 
@@ -80,10 +81,16 @@ def _level(s: Record, work: Record) -> None:
 
 @njit(cache=True)
 def _is_driven(s: Record, cfg: Record, work: Record, t: int) -> bool:
-    """Whether what looks like rest is smooth motion: GNSS says so, or no bias is that large."""
+    """Whether what looks like rest is smooth motion: GNSS says so, or no bias is that large.
+
+    A steady push looks like rest on a slope; that it set out just now tells them apart.
+    """
     mean = work["mean"]
     rate = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]
     if rate > _LARGEST_BIAS_RAD_S * _LARGEST_BIAS_RAD_S:
+        return True
+    v = s["align_v"]
+    if s["mode"] == LEVELLED and v[0] * v[0] + v[1] * v[1] > _SET_OUT_M_S * _SET_OUT_M_S:
         return True
     recent = s["align_fix_t"] >= 0 and (t - s["align_fix_t"]) * 1e-9 < _RECENT_FIX_S
     return recent and s["align_speed"] >= cfg["course_speed"]
@@ -126,23 +133,36 @@ def align_sample(
         for i in range(3):
             s["align_v"][i] = 0.0
     if s["mode"] == LEVELLED and not still:
-        bg = s["bg"]
-        q, scratch = s["align_q"], work["q"]
-        quaternion_from_vector(
-            (w[0] - bg[0]) * dt, (w[1] - bg[1]) * dt, (w[2] - bg[2]) * dt, scratch[0]
-        )
-        quaternion_multiply(q, scratch[0], scratch[1])
-        for i in range(4):
-            q[i] = scratch[1, i]
-        quaternion_normalize(q)
-        # Gravity is what the specific force was at rest, so that the bias goes with it.
-        M, v = work["M"], s["align_v"]
-        matrix_from_quaternion(q, M)
-        a0, a1, a2 = rotate3(M, f[0], f[1], f[2])
-        rest = s["rest_f"]
-        v[0] += a0 * dt
-        v[1] += a1 * dt
-        v[2] += (a2 + sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2])) * dt
+        v = s["align_v"]
+        if v[0] == 0.0 and v[1] == 0.0 and v[2] == 0.0:
+            # It began before it was seen: the samples that were kept out of the rest are motion.
+            guard = _GUARD_BLOCKS * cfg["stop_block"]
+            for k in range(min(guard, s["window_count"] - 1), 0, -1):
+                old = s["window"][(s["window_head"] - 1 - k + WINDOW) % WINDOW]
+                _turn(s, work, old[:3], old[3:], cfg["imu_interval"])
+        _turn(s, work, w, f, dt)
+
+
+@njit(cache=True)
+def _turn(s: Record, work: Record, w: Array, f: Array, dt: float) -> None:
+    """Carry attitude and velocity since the rest over a sample, in a level frame."""
+    bg = s["bg"]
+    q, scratch = s["align_q"], work["q"]
+    quaternion_from_vector(
+        (w[0] - bg[0]) * dt, (w[1] - bg[1]) * dt, (w[2] - bg[2]) * dt, scratch[0]
+    )
+    quaternion_multiply(q, scratch[0], scratch[1])
+    for i in range(4):
+        q[i] = scratch[1, i]
+    quaternion_normalize(q)
+    # Gravity is what the specific force was at rest, so that the bias goes with it.
+    M, v = work["M"], s["align_v"]
+    matrix_from_quaternion(q, M)
+    a0, a1, a2 = rotate3(M, f[0], f[1], f[2])
+    rest = s["rest_f"]
+    v[0] += a0 * dt
+    v[1] += a1 * dt
+    v[2] += (a2 + sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2])) * dt
 
 
 @njit(cache=True)

@@ -156,3 +156,11 @@ def test_metadata_that_cannot_be_read_is_told():
     assert cut_spans({"replay.degrade": {"json": '{"outages": []}'}}) == ()
     with pytest.raises(DataError, match=r"replay\.degrade"):
         cut_spans({"replay.degrade": {"json": "[]"}})
+
+
+def test_the_drift_is_read_before_the_update_where_the_receivers_clock_is_ahead():
+    # Outages are told by the receiver's clock, 0.12 ms ahead: true times of its epochs lie before.
+    found = evaluate_channels(drifting_run(metadata=degrade((10.0, 20.00012)))).outages
+    assert [outage.ended for outage in found] == [True]
+    assert found[0].drift_time_ns == at(20.0)
+    assert found[0].east_drift_m == pytest.approx(10.0, abs=1e-6)
