@@ -113,6 +113,13 @@ IMU: Final = ChannelSpec(
         "specific_force_body_m_s2": Tolerance(1e-9, "m/s^2"),
     },
 )
+IMU_UNIT: Final = ChannelSpec(
+    "IMU_UNIT",
+    "/imu/{unit}/raw",
+    IMU.message,
+    "samples of a further inertial unit, which `imu.name` puts in the place of the first",
+    tolerances=IMU.tolerances,
+)
 GNSS_FIX: Final = ChannelSpec(
     "GNSS_FIX",
     "/gnss/{receiver}/fix",
@@ -427,6 +434,10 @@ SIGNAL_TRUTH: Final = ChannelSpec(
             "code_noise_m",
             "carrier_noise_m",
             "antenna_m",
+            "solid_tide_m",
+            "pole_tide_m",
+            "wind_up_m",
+            "carrier_delay_m",
         )
     },
 )
@@ -633,6 +644,7 @@ CHECKPOINT: Final = ChannelSpec(
 # The order is the rank that breaks ties between rows of one time and one depth.
 CHANNELS: Final[tuple[ChannelSpec, ...]] = (
     IMU,
+    IMU_UNIT,
     RECEIVER,
     ANTENNAS,
     NAV,

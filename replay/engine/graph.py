@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from replay.channels import IMU, IMU_UNIT
 from replay.errors import MissingChannelError, UsageError
 from replay.stages.base import BASE, RECEIVER, Port, Stage
 
@@ -58,7 +59,8 @@ def bind(
     run : str
         Name that fills `{run}` in the topics of the last stage's outputs.
     receivers : mapping of role to str, optional
-        Which receiver plays which role. Where it is empty the only one that the log
+        Which receiver plays which role, and under IMU_UNIT's name which inertial unit stands
+        in for the one without a name. Where it is empty the only one that the log
         has is taken, leaving aside the one that plays another role or is called so.
 
     Raises
@@ -146,6 +148,9 @@ def _find(
 ) -> str | None:
     spec = port.channel
     fitting = [topic for topic in topics if spec.matches(topic)]
+    if spec is IMU and receivers.get(IMU_UNIT.name):
+        spec = IMU_UNIT
+        fitting = [topic for topic in topics if topic == spec.at(unit=receivers[spec.name])]
     if port.run:
         fitting = [topic for topic in fitting if spec.parts(topic).get("run") == port.run]
     if "{baseline}" in spec.topic:
@@ -173,7 +178,8 @@ def _find(
         raise MissingChannelError(
             f"{stage} needs a channel {spec.topic} ({spec.about})",
             where=f"the log has: {known}",
-            mend="import or simulate a log with this channel, or choose a receiver that it has",
+            mend="import or simulate a log with this channel, or choose a receiver or inertial "
+            "unit that it has",
         )
     raise UsageError(
         f"{stage} can read any of {', '.join(fitting)}",

@@ -69,6 +69,9 @@ def make_job(
 ) -> Job:
     """A job over a log: built-in defaults, then the log's own, then `tables`.
 
+    Where an inertial unit is chosen by its name, what the log says of that goes over the rest
+    of its own.
+
     Raises
     ------
     UsageError
@@ -78,4 +81,9 @@ def make_job(
     text = reader.metadata.get(DEFAULTS, {}).get("toml", "")
     own = configuration.known_part(pipeline.config, tomllib.loads(text))
     config = configuration.build(pipeline.config, [own, *tables])
+    unit = getattr(getattr(config, "imu", None), "name", "")
+    if unit:
+        text = reader.metadata.get(f"{DEFAULTS}.{unit}", {}).get("toml", "")
+        of_unit = configuration.known_part(pipeline.config, tomllib.loads(text))
+        config = configuration.build(pipeline.config, [own, of_unit, *tables])
     return Job(pipeline_name, config, start_ns, end_ns, checkpoint_every_s)

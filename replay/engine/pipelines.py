@@ -30,11 +30,14 @@ class Pipeline:
         One line for a person.
     parts : callable
         Settings and stages. It imports them, so that a run loads its own kernels alone.
+    unnamed : callable, optional
+        Name of a run over a log with given topics, where the settings leave it empty.
     """
 
     name: str
     about: str
     parts: Callable[[], Parts]
+    unnamed: Callable[[Any, Collection[str]], str] | None = None
 
     @property
     def config(self) -> type[Section]:
@@ -46,12 +49,20 @@ class Pipeline:
         found = self.parts()[1]
         return found(config, topics) if callable(found) else found
 
+    def run_name(self, config: Section, topics: Collection[str]) -> str:
+        """Name of a run over a log with these topics."""
+        name = str(getattr(config, "name", self.name))
+        return name if name or self.unnamed is None else self.unnamed(config, topics)
+
 
 def _gnss_ins_lc() -> Parts:
     from replay.stages.gnss_ins_lc import GnssInsLoose
     from replay.stages.loose_config import LooseConfig
 
-    return LooseConfig, (GnssInsLoose(),)
+    def stages(config: LooseConfig, topics: Collection[str]) -> Stages:
+        return (GnssInsLoose(config.smoothing.record),)
+
+    return LooseConfig, stages
 
 
 def _gnss_ins_tc() -> Parts:
@@ -59,7 +70,10 @@ def _gnss_ins_tc() -> Parts:
     from replay.stages.satellites import Satellites
     from replay.stages.tight_config import TightConfig
 
-    return TightConfig, (Satellites(), TightInertial())
+    def stages(config: TightConfig, topics: Collection[str]) -> Stages:
+        return (Satellites(), TightInertial(config.smoothing.record))
+
+    return TightConfig, stages
 
 
 def _spp() -> Parts:
@@ -75,7 +89,10 @@ def _kfspp() -> Parts:
     from replay.stages.satellites import Satellites
     from replay.stages.spp_config import KfsppConfig
 
-    return KfsppConfig, (Satellites(), FilteredSinglePoint())
+    def stages(config: KfsppConfig, topics: Collection[str]) -> Stages:
+        return (Satellites(), FilteredSinglePoint(config.smoothing.record))
+
+    return KfsppConfig, stages
 
 
 def _tdcp() -> Parts:
@@ -92,7 +109,30 @@ def _tdcp_ins() -> Parts:
     from replay.stages.tdcp_ins import TdcpInertial
     from replay.stages.tdcp_ins_config import TdcpInsConfig
 
-    return TdcpInsConfig, (Satellites(), TimeDifferencedPhase(), TdcpInertial())
+    def stages(config: TdcpInsConfig, topics: Collection[str]) -> Stages:
+        last = TdcpInertial(config.smoothing.record)
+        return (Satellites(), TimeDifferencedPhase(), last)
+
+    return TdcpInsConfig, stages
+
+
+def _ppp() -> Parts:
+    from replay.stages.ppp import Ppp
+    from replay.stages.ppp_config import PppConfig
+    from replay.stages.precise_satellites import PreciseSatellites
+
+    return PppConfig, (PreciseSatellites(), Ppp())
+
+
+def _ppp_ins_tc() -> Parts:
+    from replay.stages.ppp_ins_config import PppInsConfig
+    from replay.stages.ppp_ins_tc import PppInertial
+    from replay.stages.precise_satellites import PreciseSatellites
+
+    def stages(config: PppInsConfig, topics: Collection[str]) -> Stages:
+        return (PreciseSatellites(), PppInertial(config.smoothing.record))
+
+    return PppInsConfig, stages
 
 
 def _rtk() -> Parts:
@@ -100,7 +140,10 @@ def _rtk() -> Parts:
     from replay.stages.rtk_config import RtkConfig
     from replay.stages.satellites import Satellites
 
-    return RtkConfig, (Satellites(), Satellites("base"), Rtk())
+    def stages(config: RtkConfig, topics: Collection[str]) -> Stages:
+        return (Satellites(), Satellites("base"), Rtk(record=config.smoothing.record))
+
+    return RtkConfig, stages
 
 
 def _rtk_ins_tc() -> Parts:
@@ -108,7 +151,11 @@ def _rtk_ins_tc() -> Parts:
     from replay.stages.rtk_ins_tc import RtkInertial
     from replay.stages.satellites import Satellites
 
-    return RtkInsConfig, (Satellites(), Satellites("base"), RtkInertial())
+    def stages(config: RtkInsConfig, topics: Collection[str]) -> Stages:
+        last = RtkInertial(record=config.smoothing.record)
+        return (Satellites(), Satellites("base"), last)
+
+    return RtkInsConfig, stages
 
 
 def _moving_base() -> Parts:
@@ -116,7 +163,10 @@ def _moving_base() -> Parts:
     from replay.stages.rtk_config import MovingBaseConfig
     from replay.stages.satellites import Satellites
 
-    return MovingBaseConfig, (Satellites(), MovingBaseSatellites(), Rtk())
+    def stages(config: MovingBaseConfig, topics: Collection[str]) -> Stages:
+        return (Satellites(), MovingBaseSatellites(), Rtk(record=config.smoothing.record))
+
+    return MovingBaseConfig, stages
 
 
 def _network() -> Parts:
@@ -135,7 +185,8 @@ def _network_rtk() -> Parts:
     from replay.stages.rtk import Rtk
 
     def stages(config: NetworkRtkConfig, topics: Collection[str]) -> Stages:
-        return (*rover_stages(config, topics), Rtk(corrected=config.mode == "network"))
+        last = Rtk(corrected=config.mode == "network", record=config.smoothing.record)
+        return (*rover_stages(config, topics), last)
 
     return NetworkRtkConfig, stages
 
@@ -146,7 +197,8 @@ def _network_ins_tc() -> Parts:
     from replay.stages.rtk_ins_tc import RtkInertial
 
     def stages(config: NetworkInsConfig, topics: Collection[str]) -> Stages:
-        return (*rover_stages(config, topics), RtkInertial(corrected=config.mode == "network"))
+        last = RtkInertial(corrected=config.mode == "network", record=config.smoothing.record)
+        return (*rover_stages(config, topics), last)
 
     return NetworkInsConfig, stages
 
@@ -160,6 +212,24 @@ def _network_virtual() -> Parts:
         return (*corrected_stages(config, topics), NetworkVirtual())
 
     return NetworkConfig, stages
+
+
+def _smooth() -> Parts:
+    from replay.channels import FILTER_STATE
+    from replay.stages.smooth import Smoother, find_run
+    from replay.stages.smooth_config import SmoothConfig
+
+    def stages(config: SmoothConfig, topics: Collection[str]) -> Stages:
+        run = find_run(config, topics)
+        return (Smoother(run, inertial=FILTER_STATE.at(run=run) in topics),)
+
+    return SmoothConfig, stages
+
+
+def _smoothed(config: Any, topics: Collection[str]) -> str:
+    from replay.stages.smooth import find_run
+
+    return f"{find_run(config, topics)}-smoothed"
 
 
 _ALL: Final = (
@@ -192,6 +262,16 @@ _ALL: Final = (
         "tdcp-ins",
         "inertial samples held by displacements from time-differenced carrier phases",
         _tdcp_ins,
+    ),
+    Pipeline(
+        "ppp",
+        "precise point positioning: uncombined codes and phases, precise orbits and clocks",
+        _ppp,
+    ),
+    Pipeline(
+        "ppp-ins-tc",
+        "tightly coupled PPP/INS: codes, phases, Doppler, precise orbits, inertial samples",
+        _ppp_ins_tc,
     ),
     Pipeline(
         "rtk",
@@ -227,6 +307,12 @@ _ALL: Final = (
         "moving-base",
         "relative positioning of two receivers that both move: baseline, heading",
         _moving_base,
+    ),
+    Pipeline(
+        "smooth",
+        "smoothing of a run that was made with smoothing.record, backwards through its log",
+        _smooth,
+        _smoothed,
     ),
 )
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from replay import channels, time
-from replay.channels import CHECKPOINT, TRACE, ChannelSpec
+from replay.channels import CHECKPOINT, IMU_UNIT, TRACE, ChannelSpec
 from replay.engine.blocks import Batch, head, merge_rows, until
 from replay.engine.floating_point import require_ieee_arithmetic
 from replay.engine.graph import Node, bind
@@ -24,6 +24,7 @@ from replay.engine.sink import Sink, announce_as_recorded
 from replay.engine.trace import StageTrace
 from replay.errors import CorruptLogError, LossReport, UsageError
 from replay.log import codec
+from replay.log.backwards import backwards
 from replay.log.columns import Columns, Ragged
 from replay.log.digest import ChannelDigest
 from replay.log.reader import LogReader
@@ -76,8 +77,10 @@ class Replayer:
         }
         section = getattr(job.config, "gnss", None)
         receivers = {role: str(getattr(section, role, "")) for role in (RECEIVER, BASE)}
-        name = str(getattr(job.config, "name", job.pipeline))
-        stages = find_pipeline(job.pipeline).stages(job.config, list(self.recorded))
+        receivers[IMU_UNIT.name] = str(getattr(getattr(job.config, "imu", None), "name", ""))
+        pipeline = find_pipeline(job.pipeline)
+        name = pipeline.run_name(job.config, list(self.recorded))
+        stages = pipeline.stages(job.config, list(self.recorded))
         self.nodes = bind(stages, self._depths(), run=name, receivers=receivers)
         self.traces = [StageTrace(node) for node in self.nodes]
         self.states = [self._start(node) for node in self.nodes]
@@ -156,7 +159,16 @@ class Replayer:
             for name, topic in node.inputs.items()
             if topic in self.recorded
         }
-        return node.stage.start(self.job.config, Context(topics, heads))
+
+        def rows_backwards(name: str) -> Iterator[Columns]:
+            return backwards(
+                self.reader,
+                node.inputs[name],
+                start_ns=self.job.start_ns,
+                end_ns=self.job.end_ns,
+            )
+
+        return node.stage.start(self.job.config, Context(topics, heads, rows_backwards))
 
     def _announce(self, sink: Sink) -> None:
         for topic, info in self.recorded.items():

@@ -9,14 +9,24 @@ from pathlib import Path
 
 import numpy as np
 
-from replay.channels import GNSS_FIX, GNSS_OBS, IMU, NAV, RECEIVER, ChannelSpec
+from replay.channels import (
+    FILTER_TRANSITION,
+    GNSS_FIX,
+    GNSS_OBS,
+    IMU,
+    NAV,
+    RECEIVER,
+    SOLUTION,
+    ChannelSpec,
+)
 from replay.engine.job import make_job
 from replay.engine.manifest import DEFAULTS
 from replay.engine.pipelines import PIPELINES, find_pipeline
 from replay.engine.run import replay_log
 from replay.gnss.ephemerides import ephemeris_columns
+from replay.ins.states import state_names
 from replay.kernels.ephemeris import EPHEMERIS_DTYPE
-from replay.log.columns import Columns, Ragged
+from replay.log.columns import Column, Columns, Ragged
 from replay.log.reader import LogReader
 from replay.log.writer import LogWriter
 
@@ -37,9 +47,11 @@ def compile_kernels(pipelines: Sequence[str] = ()) -> float:
     with tempfile.TemporaryDirectory() as scratch:
         source = Path(scratch) / "in.mcap"
         _write_small_log(source)
+        recorded = Path(scratch) / "recorded.mcap"
+        _write_recorded_run(recorded)
         for name in pipelines or PIPELINES:
             find_pipeline(name)
-            with LogReader(source) as reader:
+            with LogReader(recorded if name == "smooth" else source) as reader:
                 job = make_job(reader, name, tables=[])
                 replay_log(reader, Path(scratch) / f"{name}.mcap", job)
     return clock.perf_counter() - begin
@@ -59,6 +71,49 @@ def _write_small_log(path: Path) -> None:
         for topic, (spec, _) in rows.items():
             writer.add_channel(topic, spec.message)
         writer.add_metadata(DEFAULTS, {"toml": '[gnss]\nreceiver = "rover"\nbase = "base"\n'})
+        writer.write({topic: columns for topic, (_, columns) in rows.items()})
+
+
+def _write_recorded_run(path: Path) -> None:
+    """Two nodes of a filter that stands still: what smoothing reads."""
+    times = np.arange(2, dtype=np.int64) * _STEP_NS
+    states = 9
+    names = state_names(15, mounting=False, lever=False, squat=False)[:states]
+    triangle = np.eye(states)[np.triu_indices(states)]
+    each = Ragged.from_matrix
+    none = np.zeros(1, dtype=np.uint32)
+    transition: dict[str, Column] = {
+        "since_ns": np.array([0, 0], dtype=np.int64),
+        "dimension_before": np.array([0, states], dtype=np.uint32),
+        "dimension": np.full(2, states, dtype=np.uint32),
+        "state_names": Ragged.from_texts([",".join(names)] * 2),
+        "row": Ragged(np.array([0, 0, 1], dtype=np.int64), none),
+        "column": Ragged(np.array([0, 0, 1], dtype=np.int64), none),
+        "value": Ragged(np.array([0, 0, 1], dtype=np.int64), np.ones(1)),
+        "predicted_upper_triangle": each(np.tile(triangle, (2, 1))),
+        "correction": each(np.zeros((2, states))),
+        "updated_upper_triangle": each(np.tile(triangle, (2, 1))),
+        "estimate": each(np.tile([*_PLACE, *np.zeros(states - 3)], (2, 1))),
+        "q_body_to_ecef": each(np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))),
+        "solution": np.ones(2, dtype=np.uint32),
+    }
+    solution: dict[str, Column] = {
+        "position_ecef_m": np.tile(_PLACE, (2, 1)),
+        "velocity_enu_m_s": np.zeros((2, 3)),
+        "attitude_rad": np.zeros((2, 3)),
+        "angular_rate_body_rad_s": np.zeros((2, 3)),
+        "position_covariance_enu_m2": np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 1.0], (2, 1)),
+        "velocity_std_enu_m_s": np.ones((2, 3)),
+        "attitude_std_rad": np.ones((2, 3)),
+        "status": np.ones(2, dtype=np.int32),
+    }
+    rows = {
+        FILTER_TRANSITION.at(run="still"): (FILTER_TRANSITION, Columns.build(times, transition)),
+        SOLUTION.at(run="still"): (SOLUTION, Columns.build(times, solution)),
+    }
+    with LogWriter(path) as writer:
+        for topic, (spec, _) in rows.items():
+            writer.add_channel(topic, spec.message)
         writer.write({topic: columns for topic, (_, columns) in rows.items()})
 
 

@@ -18,7 +18,7 @@ from numba import njit
 
 from replay.kernels.earth import EARTH_RATE_RAD_S, GRAVITATIONAL_CONSTANT_M3_S2
 from replay.kernels.elementary import sqrt
-from replay.kernels.types import Array, Record
+from replay.kernels.types import Array
 
 POSITION = 0
 VELOCITY = 3
@@ -82,6 +82,29 @@ def _apply(
 
 
 @njit(cache=True)
+def transition_columns(T: Array, count: int, scaled: bool, work: Array) -> None:
+    """The nine busy rows of the transition matrix times what each row of `T` says of the states.
+
+    Parameters
+    ----------
+    T : float64 array (at least count, at least 21 or 15)
+        Row by row; the first nine columns are changed, those of states 9 and on are not.
+    count : int
+        Rows.
+    scaled : bool
+        Whether states 15 to 20 are scale factors.
+    work : float64 array
+        As :func:`propagate` has left it: the same interval.
+    """
+    out = work[22]
+    for k in range(count):
+        _apply(T[k], out, work[23, 0], work[9:12], work[12:15], work[15:18], work[18:21],
+               work[21], scaled)  # fmt: skip
+        for i in range(9):
+            T[k, i] = out[i]
+
+
+@njit(cache=True)
 def _add_body_noise(P: Array, first: int, C: Array, noise: Array) -> None:
     """Add C diag(noise) C' to the (3, 3) block at `first`."""
     a, b, c = noise[first], noise[first + 1], noise[first + 2]
@@ -92,6 +115,65 @@ def _add_body_noise(P: Array, first: int, C: Array, noise: Array) -> None:
             )
             P[first + i, first + j] = value
             P[first + j, first + i] = value
+
+
+@njit(cache=True)
+def _take(out: Array, n: int, a: float, x: Array, b: float, y: Array, c: float, z: Array) -> None:
+    """Take a x + b y + c z off a row."""
+    for j in range(n):
+        out[j] -= a * x[j] + b * y[j] + c * z[j]
+
+
+@njit(cache=True)
+def _busy_rows(P: Array, n: int, scaled: bool, dt: float, work: Array) -> None:
+    """The nine busy rows of Phi P into the first rows of `work`.
+
+    Number for number what `_apply` does to a row of P, which is symmetric, but along rows, so
+    that several columns are done at once.
+    """
+    w = EARTH_RATE_RAD_S * dt
+    w2 = 2.0 * w
+    f = work[21]
+    r0, r1, r2 = P[0], P[1], P[2]
+    v0, v1, v2 = P[3], P[4], P[5]
+    p0, p1, p2 = P[6], P[7], P[8]
+    for i in range(3):
+        row, rate, out = P[i], P[3 + i], work[i]
+        for j in range(n):
+            out[j] = row[j] + dt * rate[j]
+    y0, y1, y2 = work[3], work[4], work[5]
+    a, b, c = work[9, 0], work[9, 1], work[9, 2]
+    for j in range(n):
+        y0[j] = v0[j] + (a * r0[j] + b * r1[j] + c * r2[j]) + w2 * v1[j]
+    a, b, c = work[10, 0], work[10, 1], work[10, 2]
+    for j in range(n):
+        y1[j] = v1[j] + (a * r0[j] + b * r1[j] + c * r2[j]) - w2 * v0[j]
+    a, b, c = work[11, 0], work[11, 1], work[11, 2]
+    for j in range(n):
+        y2[j] = v2[j] + (a * r0[j] + b * r1[j] + c * r2[j])
+    a, b, c = f[0], f[1], f[2]
+    for j in range(n):
+        y0[j] -= b * p2[j] - c * p1[j]
+    for j in range(n):
+        y1[j] -= c * p0[j] - a * p2[j]
+    for j in range(n):
+        y2[j] -= a * p1[j] - b * p0[j]
+    x0, x1, x2 = work[6], work[7], work[8]
+    for j in range(n):
+        x0[j] = p0[j] + w * p1[j]
+    for j in range(n):
+        x1[j] = p1[j] - w * p0[j]
+    for j in range(n):
+        x2[j] = p2[j]
+    for i in range(3):
+        a, b, c = work[12 + i, 0], work[12 + i, 1], work[12 + i, 2]
+        _take(work[3 + i], n, a, P[12], b, P[13], c, P[14])
+        _take(work[6 + i], n, a, P[9], b, P[10], c, P[11])
+        if scaled:
+            a, b, c = work[18 + i, 0], work[18 + i, 1], work[18 + i, 2]
+            _take(work[6 + i], n, a, P[15], b, P[16], c, P[17])
+            a, b, c = work[15 + i, 0], work[15 + i, 1], work[15 + i, 2]
+            _take(work[3 + i], n, a, P[18], b, P[19], c, P[20])
 
 
 @njit(cache=True)
@@ -107,7 +189,8 @@ def propagate(
     dt: float,
     decay: Array,
     noise: Array,
-    work: Record,
+    busy: int,
+    work: Array,
 ) -> None:
     """P becomes Phi P Phi' + Q over one interval, exactly symmetric.
 
@@ -132,6 +215,9 @@ def propagate(
     noise : float64 array (n,)
         Variance that each state gains over the interval; that of velocity and
         attitude along body axes.
+    busy : int
+        States that time changes; those behind them are constants, with a decay of one and no
+        noise: what they are to each other stays as it is.
     work : float64 array (at least 25, at least max(n, 9))
         Overwritten.
     """
@@ -154,11 +240,8 @@ def propagate(
         f[i] = f_e[i] * dt
     G[0, 0] += centrifugal
     G[1, 1] += centrifugal
-    # The nine busy rows of Phi P: P is symmetric, so column j comes from row j.
-    for j in range(n):
-        _apply(P[j], out, dt, G, Cd, A, W, f, scaled)
-        for i in range(9):
-            work[i, j] = out[i]
+    work[23, 0] = dt
+    _busy_rows(P, n, scaled, dt, work)
     for i in range(9):
         _apply(work[i], out, dt, G, Cd, A, W, f, scaled)
         for j in range(i, 9):
@@ -167,14 +250,25 @@ def propagate(
         P[i, i] += noise[i] if i < VELOCITY else 0.0
     _add_body_noise(P, VELOCITY, C, noise)
     _add_body_noise(P, ATTITUDE, C, noise)
-    for j in range(9, n):
+    last = min(busy, n)
+    for i in range(9):
+        row, out = work[i], P[i]
+        for j in range(9, last):
+            out[j] = row[j] * decay[j]
+        for j in range(last, n):
+            out[j] = row[j]
+    for j in range(9, last):
+        row = P[j]
         d = decay[j]
+        for m in range(j, last):
+            row[m] = row[m] * d * decay[m]
+        for m in range(last, n):
+            row[m] = row[m] * d
+        row[j] += noise[j]
+    # What stands above the diagonal goes below it.
+    for j in range(9, n):
+        column = P[j]
         for i in range(9):
-            value = work[i, j] * d
-            P[i, j] = value
-            P[j, i] = value
-        for m in range(j, n):
-            value = P[j, m] * d * decay[m]
-            P[j, m] = value
-            P[m, j] = value
-        P[j, j] += noise[j]
+            column[i] = P[i, j]
+        for m in range(9, min(j, last)):
+            column[m] = P[m, j]

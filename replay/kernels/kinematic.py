@@ -4,7 +4,7 @@ States are position, velocity (ECEF) and, for each of the five systems, receiver
 and drift (m, m/s). Tang et al. (2021), eqs 6 to 9, has ten of them for two systems.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba import njit
@@ -24,6 +24,16 @@ from replay.kernels.single_point import (
     predicted_range_rate,
     true_time,
     usable,
+)
+from replay.kernels.transition import (
+    OWN,
+    SILENT,
+    add_correction,
+    begin_trail,
+    carry_rate,
+    close_node,
+    forget,
+    open_node,
 )
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import code_variance, noise_factor
@@ -86,7 +96,7 @@ def begin(s: Record, epoch: Record) -> None:
 
 
 @njit(cache=True)
-def meet(s: Record, system: int, clock: float) -> None:
+def meet(s: Record, system: int, clock: float, trail: Record) -> None:
     """First range of a system: its clock (m) begins there, as uncertain as at the start.
 
     What prediction has made of a clock that nothing measured would swamp the rounding.
@@ -101,16 +111,24 @@ def meet(s: Record, system: int, clock: float) -> None:
             P[j, a] = 0.0
     P[_CLOCK + system, _CLOCK + system] = _WIDE_M2
     P[_DRIFT + system, _DRIFT + system] = _WIDE_DRIFT_M2_S2
+    if trail["on"] == 1:
+        forget(trail, _CLOCK + system, _WIDE_M2)
+        forget(trail, _DRIFT + system, _WIDE_DRIFT_M2_S2)
 
 
 @njit(cache=True)
-def predict(s: Record, cfg: Record, dt: float) -> None:
+def predict(s: Record, cfg: Record, dt: float, trail: Record) -> None:
     """Carry state and covariance over `dt` (s): constant velocity, constant drift."""
     x, P = s["x"], s["P"]
     for i in range(3):
         _pair(x, P, i, 3 + i, dt, 0.0, cfg["velocity_noise"])
     for k in range(SYSTEMS):
         _pair(x, P, _CLOCK + k, _DRIFT + k, dt, cfg["clock_noise"], cfg["drift_noise"])
+    if trail["on"] == 1:
+        for i in range(3):
+            carry_rate(trail, i, 3 + i, dt)
+        for k in range(SYSTEMS):
+            carry_rate(trail, _CLOCK + k, _DRIFT + k, dt)
 
 
 @njit(cache=True)
@@ -138,6 +156,7 @@ def _use(
     index: Array,
     scratch: Array,
     out: Record,
+    trail: Record,
 ) -> bool:
     """One scalar measurement: gate, update, and what is to be said of it."""
     P, x = s["P"], s["x"]
@@ -162,6 +181,8 @@ def _use(
     scalar_update(P, STATES, h, index, count, z * inverse, dx, scratch[1], scratch[2])
     for i in range(STATES):
         x[i] += dx[i]
+    if trail["on"] == 1:
+        add_correction(trail, dx, STATES)
     return True
 
 
@@ -187,6 +208,7 @@ def update_epoch(
     h: Array,
     index: Array,
     scratch: Array,
+    trail: Record,
 ) -> int:
     """Use an epoch's ranges and range rates; how many ranges were believed.
 
@@ -195,6 +217,8 @@ def update_epoch(
     single = cfg["single"]
     x = s["x"]
     used, offered = 0, 0
+    if trail["on"] == 1:
+        open_node(trail, s["P"], STATES)
     for k in range(rows.shape[0]):
         row = rows[k]
         weight[k] = 0.0
@@ -211,7 +235,7 @@ def update_epoch(
             continue
         z -= geometric_range(row, x[:3], u)
         if s["known"][system] == 0:
-            meet(s, system, z)
+            meet(s, system, z, trail)
         for i in range(3):
             h[i] = -u[i]
             index[i] = i
@@ -223,7 +247,7 @@ def update_epoch(
         offered += 1
         _describe(out, epoch, row, KIND_PSEUDORANGE)
         z -= x[_CLOCK + system]
-        if _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out):
+        if _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out, trail):
             weight[k] = 1.0
             used += 1
     for k in range(rows.shape[0]):
@@ -244,7 +268,7 @@ def update_epoch(
         out = innovations[counts[1]]
         counts[1] += 1
         _describe(out, epoch, row, KIND_DOPPLER)
-        _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out)
+        _use(s, 4, z, variance, cfg["gate"], h, index, scratch, out, trail)
     if offered >= 4 and 2 * used < offered:
         s["rejected"] += 1
     else:
@@ -287,7 +311,9 @@ def emit(s: Record, epoch: Record, reference: int, axes: Array, out: Record) -> 
 
 
 @njit(cache=True)
-def prepare(s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array) -> bool:
+def prepare(
+    s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array, trail: Record
+) -> bool:
     """Bring the state to an epoch, anew after a gap; False where there is nothing to begin with."""
     reference = first_known(s)
     placed = epoch["placed"] == 1 and epoch["age"] == 0.0
@@ -306,7 +332,7 @@ def prepare(s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array) 
         now = true_time(epoch["t"], expected)
         dt = (now - s["t"]) * 1e-9
         if 0.0 < dt <= cfg["gap"] and s["rejected"] < cfg["rejections"]:
-            predict(s, cfg, dt)
+            predict(s, cfg, dt, trail)
             s["t"] = now
             return True
         if -cfg["gap"] <= dt <= 0.0:
@@ -318,6 +344,7 @@ def prepare(s: Record, cfg: Record, epoch: Record, notes: Array, counts: Array) 
         _note(notes, counts, epoch, EVENT_TOO_FEW, float(epoch["used"]))
         return False
     begin(s, epoch)
+    begin_trail(trail)
     s["t"] = true_time(epoch["t"], epoch["clock"])
     return True
 
@@ -353,6 +380,8 @@ def run_kinematic(
     innovations: Array,
     notes: Array,
     counts: Array,
+    trails: Array,
+    nodes: tuple[Any, ...],
 ) -> None:
     """Carry the filter over the epochs of a block.
 
@@ -369,8 +398,12 @@ def run_kinematic(
         Room for two per epoch.
     counts : int64 array (3,)
         Filled: solutions, innovations, notes.
+    trails : array of one `trail_dtype(STATES)`
+        Changed where it is on.
+    nodes : tuple
+        As :func:`replay.kernels.transition.close_node` takes it.
     """
-    s, cfg, work = state[0], config[0], scratch_solve[0]
+    s, cfg, work, trail = state[0], config[0], scratch_solve[0], trails[0]
     u, h = np.zeros(3), np.zeros(4)
     index = np.zeros(4, dtype=np.int64)
     scratch = np.zeros((3, STATES))
@@ -380,10 +413,18 @@ def run_kinematic(
     for e in range(epochs.shape[0]):
         epoch = epochs[e]
         part = rows[epoch["first"] : epoch["first"] + epoch["count"]]
-        if not prepare(s, cfg, epoch, notes, counts):
+        if not prepare(s, cfg, epoch, notes, counts, trail):
             continue
-        used = update_epoch(s, cfg, epoch, part, weight, innovations, counts, u, h, index, scratch)
+        used = update_epoch(
+            s, cfg, epoch, part, weight, innovations, counts, u, h, index, scratch, trail
+        )
         reference = first_known(s)
+        if trail["on"] == 1:
+            for i in range(STATES):
+                trail["estimate"][i] = s["x"][i]
+                trail["name"][i] = i
+            own = OWN if reference >= 0 else SILENT
+            close_node(trail, s["P"], STATES, s["t"], epoch["log_t"], own, nodes)
         if reference >= 0:
             out = solutions[counts[0]]
             emit(s, epoch, reference, work["axes"], out)

@@ -5,6 +5,8 @@ record on; cutting the rows into other blocks changes no bit. An inertial interv
 in which a fix lies is split at the fix's own time.
 """
 
+from typing import Any
+
 from numba import njit
 
 from replay.kernels.alignment import align_fix, align_sample
@@ -18,7 +20,7 @@ from replay.kernels.constraints import (
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
-from replay.kernels.output_rows import emit_epoch, emit_solution
+from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution
 from replay.kernels.prediction import advance, remove_sensor_errors
 from replay.kernels.records import (
     EVENT_IMU_GAP,
@@ -36,6 +38,7 @@ from replay.kernels.records import (
     STATUS_UPDATED,
 )
 from replay.kernels.tdcp_link import begin_chain, ready_to_align, use_link
+from replay.kernels.transition import OWN, SILENT, begin_trail
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event
 
@@ -68,10 +71,10 @@ def _doubt(s: Record, cfg: Record, fix: Record) -> None:
 
 @njit(cache=True)
 def _use_fix(
-    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Array, ...]
+    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Any, ...]
 ) -> None:
     """Update with one fix at the filter's own time."""
-    solutions, epochs, covariances, innovations, events, counts = out
+    solutions, epochs, covariances, innovations, events, counts, nodes = out
     t = fix["t"]
     remove_sensor_errors(s, work)
     force = cfg["rejections"] > 0 and s["rejected"] >= cfg["rejections"]
@@ -94,16 +97,18 @@ def _use_fix(
     if fix["has_v"] == 1 and cfg["use_velocity"] == 1:
         velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     mark_epoch(s, fix)
+    if work["trail"]["on"] == 1:
+        close_inertial(s, cfg, work, log_t, OWN, nodes)
     emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
     emit_epoch(s, cfg, log_t, epochs, covariances, counts)
 
 
 @njit(cache=True)
 def constrain(
-    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Array, ...]
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Any, ...]
 ) -> None:
     """Stops and non-holonomic updates at an inertial sample."""
-    _, _, _, innovations, events, counts = out
+    innovations, events, counts = out[3], out[4], out[5]
     interval = cfg["stop_interval"]
     if (cfg["zero_velocity"] == 1 or cfg["zero_rate"] == 1) and (
         t - s["stop_last"]
@@ -131,6 +136,23 @@ def constrain(
 
 
 @njit(cache=True)
+def say_where(
+    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Any, ...]
+) -> None:
+    """A predicted solution where one is due; a node for the smoother there, or after an update."""
+    slot = t // cfg["solution_interval"]
+    shown = SILENT
+    status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
+    if slot > s["emitted_slot"]:
+        s["emitted_slot"] = slot
+        shown = OWN
+        emit_solution(s, work, status, log_t, out[0], out[5])
+    trail = work["trail"]
+    if trail["on"] == 1 and (shown == OWN or trail["updated"] == 1):
+        close_inertial(s, cfg, work, log_t, shown, out[6])
+
+
+@njit(cache=True)
 def all_finite(a: Array) -> bool:
     """Whether three numbers are neither NaN nor infinite."""
     total = a[0] + a[1] + a[2]
@@ -146,10 +168,11 @@ def _take_fixes(
     first: int,
     t: int,
     log_t: int,
-    out: tuple[Array, ...],
+    out: tuple[Any, ...],
 ) -> int:
     """Use every fix that is known by now and valid up to `t`; the number of the next one."""
-    solutions, _, _, _, events, counts = out
+    solutions, events, counts = out[0], out[4], out[5]
+    recorded = work["trail"]["on"] == 1
     k = first
     early = 0
     while k < fixes.shape[0] and fixes[k]["t"] <= t and fixes[k]["log_t"] <= log_t:
@@ -166,8 +189,11 @@ def _take_fixes(
             ):
                 s["fix_t"] = fix["t"]
                 mark_epoch(s, fix)
+                if recorded:
+                    begin_trail(work["trail"])
+                    close_inertial(s, cfg, work, log_t, OWN, out[6])
                 if fix["chain"] > 0:
-                    begin_chain(s, cfg, fix)
+                    begin_chain(s, cfg, work, fix)
                     s["chain_t"] = fix["t"]
                 s["stop_last"] = fix["t"]
                 s["nhc_last"] = fix["t"]
@@ -181,6 +207,8 @@ def _take_fixes(
         if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
             # The last word before help arrives: this is where drift is read off.
             emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
+            if recorded:
+                close_inertial(s, cfg, work, log_t, OWN, out[6])
         advance(s, cfg, work, fix["t"])
         if fix["chain"] > 0:
             use_link(s, cfg, work, fix, log_t, out)
@@ -207,6 +235,7 @@ def run_block(
     innovations: Array,
     events: Array,
     counts: Array,
+    nodes: tuple[Any, ...],
 ) -> int:
     """Carry the filter over a block.
 
@@ -228,6 +257,8 @@ def run_block(
     counts : int64 array (5,)
         Rows written of solutions, epochs, innovations, events; events for which
         there was no room.
+    nodes : tuple
+        As :func:`replay.kernels.transition.close_node` takes it.
 
     Returns
     -------
@@ -239,7 +270,7 @@ def run_block(
     work = scratch[0]
     # What a step leaves in the scratch must not depend on where the block was cut.
     work["decay_dt"] = -1.0
-    out = (solutions, epochs, covariances, innovations, events, counts)
+    out = (solutions, epochs, covariances, innovations, events, counts, nodes)
     taken = 0
     for k in range(imu_t.shape[0]):
         t = imu_t[k]
@@ -278,9 +309,5 @@ def run_block(
         if not aligning:
             push_sample(s, w_raw, f_raw)
         constrain(s, cfg, work, t, log_t, out)
-        slot = t // cfg["solution_interval"]
-        if slot > s["emitted_slot"]:
-            s["emitted_slot"] = slot
-            status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
-            emit_solution(s, work, status, log_t, solutions, counts)
+        say_where(s, cfg, work, t, log_t, out)
     return taken

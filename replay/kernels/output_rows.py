@@ -1,13 +1,27 @@
-"""What the filter says of itself: solutions in local axes, whole states with covariances."""
+"""What the filter says of itself: solutions in local axes, whole states, nodes for a smoother."""
+
+from typing import Any, Final
 
 from numba import njit
 
-from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
+from replay.kernels.covariance import (
+    ACCEL_BIAS,
+    ACCEL_SCALE,
+    ATTITUDE,
+    GYRO_BIAS,
+    GYRO_SCALE,
+    POSITION,
+    VELOCITY,
+)
 from replay.kernels.earth import EARTH_RATE_RAD_S, enu_axes
 from replay.kernels.elementary import sqrt
 from replay.kernels.rotation import euler_from_matrix, rotate3, rotate3_back
+from replay.kernels.transition import close_node
 from replay.kernels.types import Array, Record
-from replay.kernels.update import state_count
+from replay.kernels.update import state_count, total_count
+
+EXTRA_NAME: Final = 1000
+"""Number of the name of the first state behind those of the inertial system and the vehicle."""
 
 
 @njit(cache=True)
@@ -44,24 +58,24 @@ def emit_solution(
     row["w_eb"][2] = (w_raw[2] - bg[2]) / (1.0 + sg[2]) - e2
     for i in range(3):
         row["r"][i] = r[i]
-    _local_block(P, POSITION, u, N)
+    local_block(P, POSITION, u, N)
     row["cov"][0] = N[0, 0]
     row["cov"][1] = N[0, 1]
     row["cov"][2] = N[0, 2]
     row["cov"][3] = N[1, 1]
     row["cov"][4] = N[1, 2]
     row["cov"][5] = N[2, 2]
-    _local_block(P, VELOCITY, u, N)
+    local_block(P, VELOCITY, u, N)
     for i in range(3):
         row["v_std"][i] = sqrt(max(0.0, N[i, i]))
-    _local_block(P, ATTITUDE, u, N)
+    local_block(P, ATTITUDE, u, N)
     for i in range(3):
         row["a_std"][i] = sqrt(max(0.0, N[i, i]))
     s["emitted_t"] = s["t"]
 
 
 @njit(cache=True)
-def _local_block(P: Array, offset: int, u: Array, out: Array) -> None:
+def local_block(P: Array, offset: int, u: Array, out: Array) -> None:
     """U P u' of the (3, 3) block at `offset` into `out`."""
     for i in range(3):
         for j in range(i, 3):
@@ -106,3 +120,58 @@ def emit_epoch(
         for j in range(i, n):
             triangle[k] = P[i, j]
             k += 1
+
+
+@njit(cache=True)
+def close_inertial(
+    s: Record,
+    cfg: Record,
+    work: Record,
+    log_t: int,
+    solution: int,
+    nodes: tuple[Any, ...],
+) -> None:
+    """Write a node at the filter's time: see :func:`replay.kernels.transition.close_node`.
+
+    States of the inertial system and the vehicle have their places as names; those behind
+    them must have got theirs.
+    """
+    trail, nav = work["trail"], s["nav"]
+    estimate, name, q = trail["estimate"], trail["name"], trail["q"]
+    m, n = state_count(cfg), total_count(s, cfg)
+    for i in range(m):
+        name[i] = i
+        estimate[i] = 0.0
+    for i in range(3):
+        estimate[POSITION + i] = nav["r"][i]
+        estimate[VELOCITY + i] = nav["v"][i]
+        estimate[GYRO_BIAS + i] = s["bg"][i]
+        estimate[ACCEL_BIAS + i] = s["ba"][i]
+        if cfg["states"] == 21:
+            estimate[GYRO_SCALE + i] = s["sg"][i]
+            estimate[ACCEL_SCALE + i] = s["sa"][i]
+    k = cfg["states"]
+    if cfg["mounting"] == 1:
+        estimate[k] = s["mount"][0]
+        estimate[k + 1] = s["mount"][1]
+        k += 2
+    if cfg["lever"] == 1:
+        estimate[k] = s["point"][0]
+        estimate[k + 1] = s["point"][2]
+        k += 2
+    if cfg["squat"] == 1:
+        estimate[k] = s["squat"]
+    for i in range(n - m):
+        estimate[m + i] = s["aux"][i]
+    trail["inertial"] = 1
+    for i in range(4):
+        q[i] = nav["q"][i]
+    close_node(trail, s["P"], n, s["t"], log_t, solution, nodes)
+
+
+@njit(cache=True)
+def name_extras(s: Record, cfg: Record, work: Record) -> None:
+    """Number the names of the states behind those of the inertial system and the vehicle."""
+    name, m = work["trail"]["name"], state_count(cfg)
+    for i in range(s["extra"]):
+        name[m + i] = EXTRA_NAME + i

@@ -5,6 +5,7 @@ from numba import njit
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY, propagate
 from replay.kernels.elementary import exp
 from replay.kernels.strapdown import mechanize
+from replay.kernels.transition import carry_inertial
 from replay.kernels.types import Array, Record
 from replay.kernels.update import total_count
 
@@ -32,6 +33,9 @@ def _decay_and_noise(cfg: Record, work: Record, dt: float) -> None:
     for i in range(cfg["states"] + 2 * cfg["mounting"], decay.shape[0]):
         decay[i] = 1.0
         noise[i] = 0.0
+    work["busy"] = cfg["states"]
+    if cfg["mounting"] == 1 and cfg["mounting_noise"] != 0.0:
+        work["busy"] += 2
 
 
 @njit(cache=True)
@@ -73,8 +77,12 @@ def advance(s: Record, cfg: Record, work: Record, t: int) -> None:
     _decay_and_noise(cfg, work, dt)
     propagate(
         s["P"], total_count(s, cfg), cfg["states"] == 21, nav["r"], nav["C"], nav["f_e"], f, w, dt,
-        work["decay"], work["noise"], work["T"],
+        work["decay"], work["noise"], work["busy"], work["T"],
     )  # fmt: skip
+    trail = work["trail"]
+    if trail["on"] == 1:
+        trail["open"] = 0
+        carry_inertial(trail, cfg["states"], cfg["states"] == 21, work["decay"], work["T"])
     smooth = 1.0
     if cfg["nhc_smoothing"] > 0.0:
         smooth = 1.0 - exp(-dt / cfg["nhc_smoothing"])

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from replay.kernels.strapdown import NAVIGATION_DTYPE
+from replay.kernels.transition import trail_dtype
 
 MAX_STATES: Final = 29  # 26, and the three of a place that displacements are counted from
 WINDOW: Final = 512  # inertial samples that the stop detector can look back at most
@@ -234,7 +235,10 @@ EVENT_DTYPE: Final = np.dtype(
 
 
 def work_dtype(states: int) -> "np.dtype[np.void]":
-    """Scratch of a filter with room for so many error states; nothing in it outlives a step."""
+    """Scratch of a filter with room for so many error states.
+
+    Nothing in it outlives a step but the trail, which a filter that records carries on.
+    """
     return np.dtype(
         [
             ("T", "<f8", (states + 1, states + 1)),
@@ -260,6 +264,8 @@ def work_dtype(states: int) -> "np.dtype[np.void]":
             ("mean", "<f8", 6),
             ("part", "<f8", 6),
             ("decay_dt", "<f8"),  # s, interval that decay and noise belong to
+            ("busy", "<i8"),  # states that time changes; those behind them are constants
+            ("trail", trail_dtype(states)),
         ],
         align=True,
     )

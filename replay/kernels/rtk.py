@@ -8,6 +8,8 @@ measurements that disagree left out, and the integers. See
 the integers.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -62,8 +64,24 @@ from replay.kernels.rtk_resolve import (
     resolve_epoch,
     same_integers,
 )
-from replay.kernels.rtk_states import compare_frequencies, heed_breaks, predict
+from replay.kernels.rtk_states import (
+    compare_frequencies,
+    heed_breaks,
+    leading_states,
+    name_states,
+    predict,
+)
 from replay.kernels.single_point import SINGLE_STATE_DTYPE, solve_epoch, solve_velocity, true_time
+from replay.kernels.transition import (
+    GIVEN_INTEGERS,
+    OWN,
+    SILENT,
+    add_correction,
+    carry_rate,
+    close_node,
+    open_node,
+    repack,
+)
 from replay.kernels.types import Array, Record
 
 _ROUNDS = 12
@@ -170,7 +188,9 @@ def update_epoch(
 
 
 @njit(cache=True)
-def _constrain_length(x: Array, P: Array, n: int, base_x: Array, cfg: Record) -> None:
+def _constrain_length(
+    x: Array, P: Array, n: int, base_x: Array, cfg: Record, trail: Record
+) -> None:
     """Use the known length of the baseline, where the float one is sure enough to be linear."""
     length2, spread = 0.0, 0.0
     for c in range(3):
@@ -187,6 +207,8 @@ def _constrain_length(x: Array, P: Array, n: int, base_x: Array, cfg: Record) ->
     scalar_update(P, n, h, index, 3, (cfg["length"] - length) / cfg["length_sigma"], dx, b, gain)
     for i in range(n):
         x[i] += dx[i]
+    if trail["on"] == 1:
+        add_correction(trail, dx, n)
 
 
 @njit(cache=True)
@@ -267,7 +289,7 @@ def _float_epoch(
     part: Array, base_part: Array, t: int, age: float, s: Record, x: Array, P: Array, cfg: Record,
     place: Array, coarse: Array, base_x: Array, up: Array, v: Array, velocity_cov: Array,
     moves: bool, pairs: Array, measures: Array, starts: Array, broken: Array, before: Array,
-    u: Array,
+    u: Array, trail: Record,
 ) -> int:  # fmt: skip
     """Predict and update one epoch; how many measurements there were.
 
@@ -279,10 +301,13 @@ def _float_epoch(
     for c in range(3):
         baseline2 += (place[c] - base_x[c]) * (place[c] - base_x[c])
     baseline = sqrt(baseline2)
+    source = np.empty(ROOM, dtype=np.int64)
+    since = s["t"]
     A, n = predict(
-        part, base_part, pairs, count, t, baseline, s, cfg, x, P, place, v, moves, broken,
-        np.empty(ROOM, dtype=np.int64),
-    )  # fmt: skip
+        part, base_part, pairs, count, t, baseline, s, cfg, x, P, place, v, moves, broken, source
+    )
+    if trail["on"] == 1:
+        _record_prediction(s, cfg, trail, A, n - 1, (t - since) * 1e-9, source)
     for i in range(n - 1):
         before[i] = x[i]
     new, dx = np.empty((n, n)), np.zeros(n)
@@ -309,14 +334,33 @@ def _float_epoch(
         x[i] = before[i] + dx[i]
         for j in range(n - 1):
             P[i, j] = new[i, j]
+    if trail["on"] == 1:
+        add_correction(trail, dx, n - 1)
     return total
+
+
+@njit(cache=True)
+def _record_prediction(
+    s: Record, cfg: Record, trail: Record, A: Array, n: int, dt: float, source: Array
+) -> None:
+    """Tell the smoother what :func:`replay.kernels.rtk_states.predict` has done."""
+    lead = leading_states(cfg["dynamics"])
+    repack(trail, 0, n, source)
+    if lead >= 6 and source[0] >= 0:
+        for c in range(3):
+            carry_rate(trail, c, 3 + c, dt)
+            if lead == 9:
+                carry_rate(trail, c, 6 + c, 0.5 * dt * dt)
+                carry_rate(trail, 3 + c, 6 + c, dt)
+    name_states(s, lead, 0, trail["name"])
+    open_node(trail, A, n)
 
 
 @njit(cache=True)
 def _resolve(
     part: Array, measures: Array, total: int, pairs: Array, s: Record, cfg: Record, x: Array,
     P: Array, before: Array, base_x: Array, candidates: Array, tries: Array, t: int, log_t: int,
-    ambiguities: Array, resolutions: Array, counts: Array,
+    ambiguities: Array, resolutions: Array, counts: Array, trail: Record,
 ) -> bool:  # fmt: skip
     """The integers of an epoch; whether they are believed."""
     count = resolve_epoch(measures, total, pairs, part, s, cfg, x, P, candidates, tries)
@@ -334,7 +378,10 @@ def _resolve(
     write_resolution(tried, cfg["threshold"], fixed, held, t, log_t, resolutions, counts)
     if held:
         n = s["n"]
+        was = x[:n].copy()
         hold(candidates, count, x, P, n, cfg)
+        if trail["on"] == 1:
+            add_correction(trail, x[:n] - was, n)
     return fixed
 
 
@@ -378,7 +425,7 @@ def run_rtk(
     state: Array, x: Array, P: Array, config: Array, single_config: Array, scratch: Array,
     epochs: Array, rows: Array, base_epochs: Array, base_rows: Array, partner: Array,
     release: Array, solutions: Array, baselines: Array, innovations: Array, ambiguities: Array,
-    resolutions: Array, notes: Array, counts: Array,
+    resolutions: Array, notes: Array, counts: Array, trails: Array, nodes: tuple[Any, ...],
 ) -> None:  # fmt: skip
     """Work on all rover epochs of a block that are ready.
 
@@ -399,8 +446,13 @@ def run_rtk(
     notes : array (4 * epochs + 3 * rows,) of NOTE_DTYPE
     counts : int64 array (6,)
         Filled: rows of each of the six outputs, in the order above.
+    trails : array of one `trail_dtype(ROOM)`
+        Changed where it is on.
+    nodes : tuple
+        As :func:`replay.kernels.transition.close_node` takes it.
     """
     s, cfg, single, work = state[0], config[0], single_config[0], scratch[0]
+    trail = trails[0]
     u, v, base_v = np.zeros(3), np.zeros(3), np.zeros(3)
     own = np.zeros(2, dtype=SINGLE_STATE_DTYPE)
     arrays, base_arrays = np.zeros((3, SATELLITES)), np.zeros((3, SATELLITES))
@@ -460,7 +512,7 @@ def run_rtk(
         if here:
             total = _float_epoch(
                 part, base_part, epoch["t"], age, s, x, P, cfg, own[0]["x"], epoch["x"], base_x,
-                up, v, velocity_cov, moves, pairs, measures, starts, broken, before, u,
+                up, v, velocity_cov, moves, pairs, measures, starts, broken, before, u, trail,
             )  # fmt: skip
             for satellite in range(SATELLITES):
                 for slot in range(SLOTS):
@@ -472,7 +524,7 @@ def run_rtk(
                 total = 0
         if total > 0:
             if cfg["length"] > 0.0:
-                _constrain_length(x, P, s["n"], base_x, cfg)
+                _constrain_length(x, P, s["n"], base_x, cfg, trail)
             write_residuals(measures, total, pairs, part, t, log_t, innovations, counts)
             phases = settle(measures, total, s)
             status = FLOAT if phases >= _LEAST_DIFFERENCES else DGNSS
@@ -480,7 +532,7 @@ def run_rtk(
             tried = status == FLOAT and cfg["mode"] != FLOAT_ONLY
             if tried and _resolve(
                 part, measures, total, pairs, s, cfg, x, P, before, base_x, candidates, tries,
-                t, log_t, ambiguities, resolutions, counts,
+                t, log_t, ambiguities, resolutions, counts, trail,
             ):  # fmt: skip
                 status = FIXED
             for i in range(3):
@@ -501,6 +553,15 @@ def run_rtk(
                 baselines[counts[1]], t, log_t, status, position, unused, base_x, age, axes
             )
             counts[1] += 1
+        if here and trail["on"] == 1:
+            told = SILENT
+            if total > 0 and cfg["moving"] == 0:
+                held = cfg["mode"] == HOLD and s["fixed"] + 1 >= cfg["hold_count"]
+                held = held and tries[0]["whole"] == 1
+                told = GIVEN_INTEGERS if status == FIXED and not held else OWN
+            for i in range(s["n"]):
+                trail["estimate"][i] = x[i]
+            close_node(trail, P, s["n"], t, log_t, told, nodes)
         if status == FIXED and s["status"] != FIXED:
             note(notes, counts, t, log_t, EVENT_FIXED, -1, float(tries[0]["fixed"]))
         if status != FIXED and s["status"] == FIXED:

@@ -7,14 +7,14 @@ matter, and cannot be learned from it. A new clone is a new beginning: what the 
 system carried over a break of the phases stays as uncertain as it is.
 """
 
-from typing import Final
+from typing import Any, Final
 
 from numba import njit
 
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
 from replay.kernels.earth import enu_axes
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
-from replay.kernels.output_rows import emit_epoch, emit_solution
+from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution, name_extras
 from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
     AXIS_EAST,
@@ -27,6 +27,7 @@ from replay.kernels.records import (
     STATUS_UPDATED,
 )
 from replay.kernels.rotation import cross3, rotate3
+from replay.kernels.transition import OWN, copy_antenna
 from replay.kernels.types import Array, Record
 from replay.kernels.update import fill_covariance, record_event, state_count, update
 
@@ -57,7 +58,7 @@ def ready_to_align(s: Record, fix: Record) -> bool:
 
 
 @njit(cache=True)
-def begin_chain(s: Record, cfg: Record, fix: Record) -> None:
+def begin_chain(s: Record, cfg: Record, work: Record, fix: Record) -> None:
     """Take the antenna's place now as the place that displacements are counted from."""
     nav, P, lever, aux = s["nav"], s["P"], fix["lever"], s["aux"]
     n = state_count(cfg)
@@ -66,6 +67,9 @@ def begin_chain(s: Record, cfg: Record, fix: Record) -> None:
     aux[1] = nav["r"][1] + a1
     aux[2] = nav["r"][2] + a2
     s["extra"] = CLONE_STATES
+    if work["trail"]["on"] == 1:
+        name_extras(s, cfg, work)
+        copy_antenna(work["trail"], n, a0, a1, a2)
     # The antenna's error is dr + psi x a.
     for j in range(n):
         c0, c1, c2 = cross3(P[ATTITUDE, j], P[ATTITUDE + 1, j], P[ATTITUDE + 2, j], a0, a1, a2)
@@ -139,10 +143,10 @@ def _doubt(s: Record, cfg: Record) -> None:
 
 @njit(cache=True)
 def _link(
-    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Array, ...]
+    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Any, ...]
 ) -> bool:
     """Use one displacement; whether it was used."""
-    _, _, _, innovations, events, counts = out
+    innovations, events, counts = out[3], out[4], out[5]
     t = fix["t"]
     force = cfg["rejections"] > 0 and s["rejected"] >= cfg["rejections"]
     if force:
@@ -169,14 +173,14 @@ def _link(
 
 @njit(cache=True)
 def use_link(
-    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Array, ...]
+    s: Record, cfg: Record, work: Record, fix: Record, log_t: int, out: tuple[Any, ...]
 ) -> None:
     """Update with one epoch of a chain at the filter's own time, or begin a chain there.
 
     A displacement counts where it begins at the epoch that was used last. One that is
     refused ends the chain: the inertial system carries the place on.
     """
-    solutions, epochs, covariances, innovations, _, counts = out
+    solutions, epochs, covariances, innovations, _, counts, nodes = out
     remove_sensor_errors(s, work)
     linked = fix["chain"] == LINK_SUM or fix["chain"] == LINK_EACH
     used = False
@@ -184,10 +188,12 @@ def use_link(
         used = _link(s, cfg, work, fix, log_t, out)
     elif fix["anchor"] == 1:
         position_update(s, cfg, work, fix, False, fix["t"], log_t, innovations, counts)
+    status = STATUS_UPDATED if used else STATUS_PREDICTED
+    if work["trail"]["on"] == 1:
+        close_inertial(s, cfg, work, log_t, OWN, nodes)
     if not used or fix["chain"] == LINK_EACH:
-        begin_chain(s, cfg, fix)
+        begin_chain(s, cfg, work, fix)
     s["chain_t"] = fix["t"]
     mark_epoch(s, fix)
-    status = STATUS_UPDATED if used else STATUS_PREDICTED
     emit_solution(s, work, status, log_t, solutions, counts)
     emit_epoch(s, cfg, log_t, epochs, covariances, counts)

@@ -19,8 +19,15 @@ from replay.kernels.earth import enu_axes
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SYSTEMS
 from replay.kernels.gnss_update import mark_epoch
-from replay.kernels.loose import NOTE_EARLY, NOTE_FIX, NOTE_IMU, all_finite, constrain
-from replay.kernels.output_rows import emit_epoch, emit_solution
+from replay.kernels.loose import (
+    NOTE_EARLY,
+    NOTE_FIX,
+    NOTE_IMU,
+    all_finite,
+    constrain,
+    say_where,
+)
+from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution, name_extras
 from replay.kernels.prediction import advance, remove_sensor_errors
 from replay.kernels.records import (
     EVENT_IMU_GAP,
@@ -51,6 +58,7 @@ from replay.kernels.tight_update import (
     use_dopplers,
     use_phase_changes,
 )
+from replay.kernels.transition import OWN, begin_trail, carry_rate
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event, state_count, total_count
 
@@ -63,7 +71,7 @@ _EARTH_M = 6378137.0
 
 
 @njit(cache=True)
-def carry_clocks(s: Record, g: Record, cfg: Record, tcfg: Record) -> None:
+def carry_clocks(s: Record, g: Record, cfg: Record, tcfg: Record, trail: Record) -> None:
     """Carry the clocks and the drift to the filter's time."""
     dt = (s["t"] - g["clock_t"]) * 1e-9
     g["clock_t"] = s["t"]
@@ -93,6 +101,9 @@ def carry_clocks(s: Record, g: Record, cfg: Record, tcfg: Record) -> None:
         for j in range(n):
             P[j, a] = P[a, j]
     P[b, b] += tcfg["drift_noise"] * dt
+    if trail["on"] == 1:
+        for k in range(SYSTEMS):
+            carry_rate(trail, first + CLOCK + k, b, dt)
 
 
 @njit(cache=True)
@@ -158,7 +169,7 @@ def single_fix(
 
 
 @njit(cache=True)
-def _begin(s: Record, g: Record, cfg: Record, tcfg: Record) -> None:
+def _begin(s: Record, g: Record, cfg: Record, tcfg: Record, work: Record) -> None:
     """Room for the clocks and, with phases, for the clone."""
     s["extra"] = PHASE_EXTRA if tcfg["phase"] == 1 else PLAIN_EXTRA
     P, aux = s["P"], s["aux"]
@@ -177,6 +188,8 @@ def _begin(s: Record, g: Record, cfg: Record, tcfg: Record) -> None:
     g["clone_t"] = -1
     g["epoch_t"] = -1
     g["refused"] = 0
+    begin_trail(work["trail"])
+    name_extras(s, cfg, work)
 
 
 @njit(cache=True)
@@ -237,13 +250,13 @@ def use_epoch(
     out: tuple[Any, ...],
 ) -> None:
     """Update with the satellites of an epoch at the filter's own time."""
-    solutions, states, covariances, _, events, counts, gnss, residuals, tally = out
+    solutions, states, covariances, _, events, counts, nodes, gnss, residuals, tally = out
     _, observed, scratch, weight, _, u, v = room
     x = observed[:3]
     first = tally[0]
     t = s["t"]
     remove_sensor_errors(s, work)
-    carry_clocks(s, g, cfg, tcfg)
+    carry_clocks(s, g, cfg, tcfg, work["trail"])
     for k in range(rows.shape[0]):
         weight[k] = 0.0
     force = tcfg["rejections"] > 0 and g["refused"] >= tcfg["rejections"]
@@ -254,7 +267,7 @@ def use_epoch(
     used, offered = 0, 0
     antenna(s, work, tcfg["lever"], x, v)
     if tcfg["code"] == 1:
-        shift = meet_clocks(s, g, cfg, tcfg, rows, x, u, scratch)
+        shift = meet_clocks(s, g, cfg, tcfg, rows, x, u, scratch, work["trail"])
         if shift != 0.0:
             record_event(events, counts, t, log_t, EVENT_CLOCK_JUMP, shift, NOTE_FIX)
         offered = use_codes(s, g, cfg, tcfg, work, epoch, rows, weight, x, u, residuals, tally)
@@ -272,7 +285,11 @@ def use_epoch(
         if tcfg["code"] == 0:
             used = phases
         antenna(s, work, tcfg["lever"], x, v)
-        remember(s, g, cfg, tcfg, epoch, rows, x)
+    status = STATUS_UPDATED if used > 0 else STATUS_PREDICTED
+    if work["trail"]["on"] == 1:
+        close_inertial(s, cfg, work, log_t, OWN, nodes)
+    if tcfg["phase"] == 1:
+        remember(s, g, cfg, tcfg, work, epoch, rows, x)
     if offered >= 4 and 4 * used < offered:
         g["refused"] += 1
         record_event(events, counts, t, log_t, EVENT_REJECTED, float(g["refused"]), NOTE_FIX)
@@ -291,9 +308,7 @@ def use_epoch(
     _emit_satellites(s, g, cfg, epoch, rows, weight, x, u, solve, gnss[tally[1]])
     gnss[tally[1]]["log_t"] = log_t
     tally[1] += 1
-    emit_solution(
-        s, work, STATUS_UPDATED if used > 0 else STATUS_PREDICTED, log_t, solutions, counts
-    )
+    emit_solution(s, work, status, log_t, solutions, counts)
     emit_epoch(s, cfg, log_t, states, covariances, counts)
 
 
@@ -315,7 +330,7 @@ def _take_epochs(
     out: tuple[Any, ...],
 ) -> int:
     """Use every epoch up to an inertial sample at `t`; the number of the next one."""
-    solutions, _, _, _, events, counts, _, _, _ = out
+    solutions, events, counts = out[0], out[4], out[5]
     k = first
     early = 0
     while k < epochs.shape[0] and epochs[k]["log_t"] <= log_t:
@@ -335,7 +350,7 @@ def _take_epochs(
                 mark_epoch(s, fix)
                 s["stop_last"] = fix["t"]
                 s["nhc_last"] = fix["t"]
-                _begin(s, g, cfg, tcfg)
+                _begin(s, g, cfg, tcfg, work)
                 use_epoch(s, g, cfg, tcfg, work, epoch, part, solve, room, log_t, out)
             continue
         if at < s["t"]:
@@ -345,6 +360,8 @@ def _take_epochs(
         if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
             # The last word before help arrives: this is where drift is read off.
             emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
+            if work["trail"]["on"] == 1:
+                close_inertial(s, cfg, work, log_t, OWN, out[6])
         advance(s, cfg, work, at)
         use_epoch(s, g, cfg, tcfg, work, epoch, part, solve, room, log_t, out)
     if early > 0:
@@ -383,7 +400,7 @@ def run_tight(
         In the order of their availability.
     out : tuple of arrays
         Solutions, epochs, covariances, innovations, events and counts as
-        :func:`replay.kernels.loose.run_block` fills them; clocks and geometry
+        :func:`replay.kernels.loose.run_block` fills them; nodes; clocks and geometry
         (SINGLE_ROW_DTYPE); innovations of satellites (RESIDUAL_DTYPE); int64 (2,): rows
         of the last two in the order satellites, clocks.
 
@@ -461,7 +478,7 @@ def end_sample(
     s: Record, cfg: Record, work: Record, t: int, log_t: int, aligning: bool, out: tuple[Any, ...]
 ) -> None:
     """Carry the filter to the sample's time: outage, constraints, a predicted solution."""
-    solutions, events, counts = out[0], out[4], out[5]
+    events, counts = out[4], out[5]
     s["imu_t"] = t
     if s["mode"] != RUNNING:
         s["t"] = t
@@ -473,9 +490,5 @@ def end_sample(
     advance(s, cfg, work, t)
     if not aligning:
         push_sample(s, s["w_raw"], s["f_raw"])
-    constrain(s, cfg, work, t, log_t, out[:6])
-    slot = t // cfg["solution_interval"]
-    if slot > s["emitted_slot"]:
-        s["emitted_slot"] = slot
-        status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
-        emit_solution(s, work, status, log_t, solutions, counts)
+    constrain(s, cfg, work, t, log_t, out[:7])
+    say_where(s, cfg, work, t, log_t, out[:7])

@@ -23,7 +23,7 @@ from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.gnss_update import mark_epoch
 from replay.kernels.kalman import cholesky3, scalar_update
 from replay.kernels.loose import NOTE_EARLY, NOTE_FIX
-from replay.kernels.output_rows import emit_epoch, emit_solution
+from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution
 from replay.kernels.prediction import advance, remove_sensor_errors
 from replay.kernels.records import (
     EVENT_OUTAGE_END,
@@ -59,10 +59,18 @@ from replay.kernels.rtk_records import (
     ROOM,
 )
 from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE, resolve_epoch
-from replay.kernels.rtk_states import compare_frequencies, heed_breaks, predict
+from replay.kernels.rtk_states import compare_frequencies, heed_breaks, name_states, predict
 from replay.kernels.single_point import SINGLE_STATE_DTYPE, true_time
 from replay.kernels.tight import ALIGNING, SKIPPED, begin_sample, end_sample, single_fix
 from replay.kernels.tight_update import antenna
+from replay.kernels.transition import (
+    GIVEN_INTEGERS,
+    OWN,
+    add_correction,
+    begin_trail,
+    open_node,
+    repack,
+)
 from replay.kernels.types import Array, Record
 from replay.kernels.update import feed_back, record_event, state_count
 
@@ -209,6 +217,8 @@ def hold_integers(
         z = c["wavelength"] * c["integer"] - (aux[p] - aux[q])
         scalar_update(s["P"], n, h, index, 2, weight * z, dx, work["b"], work["gain"])
     feed_back(s, cfg, dx, work["q"])
+    if work["trail"]["on"] == 1:
+        add_correction(work["trail"], dx, n)
 
 
 @njit(cache=True)
@@ -243,6 +253,14 @@ def _float_update(
         x[c] = place[c]
     J = np.empty((first + n - LEAD + 1, first + n - LEAD + 1))
     joint_prior(s["P"], first, A, n, source, J)
+    trail = work["trail"]
+    if trail["on"] == 1:
+        places = np.empty(first + n - LEAD, dtype=np.int64)
+        for c in range(LEAD, n):
+            places[first + c - LEAD] = first + source[c] - LEAD if source[c] >= LEAD else -1
+        repack(trail, first, first + n - LEAD, places)
+        name_states(q, LEAD, first - LEAD, trail["name"])
+        open_node(trail, J, first + n - LEAD)
     groups = build_measures(
         part, base_part, pairs, count, abs(age), baseline, q, rcfg, x, measures, starts
     )
@@ -264,6 +282,8 @@ def _float_update(
         if c >= LEAD:
             s["aux"][c - LEAD] = x[c]
     feed_back(s, cfg, gathered, work["q"])
+    if trail["on"] == 1:
+        add_correction(trail, gathered, m)
     for k in range(total):
         measures[k]["use"] = joint[k]["use"]
         measures[k]["residual"] = joint[k]["residual"]
@@ -288,7 +308,7 @@ def use_differences(
 ) -> None:  # fmt: skip
     """Update with the differences of an epoch at the filter's own time."""
     solutions, states, covariances, _, events, counts = out[:6]
-    gnss, residuals, ambiguities, resolutions, notes, tally = out[6:]
+    gnss, residuals, ambiguities, resolutions, notes, tally = out[7:]
     x, P, pairs, measures, place, up, u, before = (
         room[0], room[1], room[2], room[3], room[8], room[11], room[12], room[13],
     )  # fmt: skip
@@ -365,6 +385,9 @@ def use_differences(
     q["status"] = status
     q["fixed"] = q["fixed"] + 1 if status == FIXED else 0
     shown = status if status > 0 else STATUS_PREDICTED
+    if work["trail"]["on"] == 1:
+        own = GIVEN_INTEGERS if status == FIXED and not held else OWN
+        close_inertial(s, cfg, work, log_t, own, out[6])
     emit_solution(s, work, shown, log_t, solutions, counts)
     if status == FIXED and not held:
         show_fixed(s, work, tries[0], x, P, room[10], solutions[counts[0] - 1])
@@ -482,6 +505,7 @@ def _take_epochs(
             s["nhc_last"] = fix["t"]
             s["extra"] = 0
             q["t"] = -1
+            begin_trail(work["trail"])
         elif epoch["placed"] == 0:
             heed_breaks(part, 0, q)
             continue
@@ -493,6 +517,8 @@ def _take_epochs(
         else:
             if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
                 emit_solution(s, work, STATUS_OUTAGE, log_t, out[0], counts)
+                if work["trail"]["on"] == 1:
+                    close_inertial(s, cfg, work, log_t, OWN, out[6])
             advance(s, cfg, work, at)
         use_differences(
             s, q, cfg, tcfg, rcfg, work, solve, epoch, part, base_epochs, base_rows,
@@ -526,7 +552,7 @@ def run_tight_rtk(
         Base epoch of each, or minus one.
     out : tuple of arrays
         Solutions, epochs, covariances, innovations, events, counts as
-        :func:`replay.kernels.loose.run_block` fills them; SINGLE_ROW_DTYPE, RESIDUAL_DTYPE,
+        :func:`replay.kernels.loose.run_block` fills them; nodes; SINGLE_ROW_DTYPE, RESIDUAL_DTYPE,
         AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE, NOTE_DTYPE; int64 (6,) rows of them as
         :mod:`replay.kernels.rtk_output` counts: geometry 0, residuals 2, ambiguities 3,
         resolutions 4, notes 5.
@@ -573,12 +599,12 @@ def run_tight_rtk(
     base_x = np.zeros(3)
     taken = 0
     for k in range(imu_t.shape[0]):
-        begun = begin_sample(s, cfg, work, imu_t[k], imu_log_t[k], imu_w[k], imu_f[k], out[:6])
+        begun = begin_sample(s, cfg, work, imu_t[k], imu_log_t[k], imu_w[k], imu_f[k], out[:7])
         if begun == SKIPPED:
             continue
         taken = _take_epochs(
             s, q, cfg, tcfg, rcfg, work, solve, epochs, rows, base_epochs, base_rows, partner,
             taken, imu_t[k], imu_log_t[k], fix, single, base_x, room, found, out,
         )  # fmt: skip
-        end_sample(s, cfg, work, imu_t[k], imu_log_t[k], begun == ALIGNING, out[:6])
+        end_sample(s, cfg, work, imu_t[k], imu_log_t[k], begun == ALIGNING, out[:7])
     return taken

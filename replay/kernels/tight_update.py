@@ -27,6 +27,7 @@ from replay.kernels.tight_records import (
     DRIFT,
     KIND_TIME_DIFFERENCE,
 )
+from replay.kernels.transition import add_correction, copy_antenna, forget, open_node
 from replay.kernels.types import Array, Record
 from replay.kernels.update import feed_back, state_count, total_count
 from replay.kernels.weighting import code_variance, noise_factor
@@ -132,15 +133,19 @@ def use_scalar(
 @njit(cache=True)
 def begin_update(s: Record, cfg: Record, work: Record) -> None:
     """Nothing gathered yet."""
-    dx = work["dx"]
-    for i in range(total_count(s, cfg)):
+    dx, n, trail = work["dx"], total_count(s, cfg), work["trail"]
+    for i in range(n):
         dx[i] = 0.0
+    if trail["on"] == 1:
+        open_node(trail, s["P"], n)
 
 
 @njit(cache=True)
 def end_update(s: Record, cfg: Record, work: Record) -> None:
     """Feed back what was gathered."""
     feed_back(s, cfg, work["dx"], work["q"])
+    if work["trail"]["on"] == 1:
+        add_correction(work["trail"], work["dx"], total_count(s, cfg))
 
 
 @njit(cache=True)
@@ -169,19 +174,22 @@ def median(values: Array, n: int) -> float:
 
 
 @njit(cache=True)
-def widen(s: Record, cfg: Record, k: int, variance: float) -> None:
+def widen(s: Record, cfg: Record, k: int, variance: float, trail: Record) -> None:
     """Make extra state `k` independent of all others, with a variance."""
     P, n, place = s["P"], total_count(s, cfg), state_count(cfg) + k
     for i in range(n):
         P[place, i] = 0.0
         P[i, place] = 0.0
     P[place, place] = variance
+    if trail["on"] == 1:
+        forget(trail, place, variance)
 
 
 @njit(cache=True)
 def meet_clocks(
-    s: Record, g: Record, cfg: Record, tcfg: Record, rows: Array, x: Array, u: Array, scratch: Array
-) -> float:
+    s: Record, g: Record, cfg: Record, tcfg: Record, rows: Array, x: Array, u: Array,
+    scratch: Array, trail: Record,
+) -> float:  # fmt: skip
     """Begin the clocks of systems that are new; by how much the receiver set its clock (m), or 0.
 
     A clock has been set where the middle innovation is more than `jump` and than four
@@ -211,7 +219,7 @@ def meet_clocks(
             shift = middle
             for system in range(SYSTEMS):
                 aux[CLOCK + system] += middle
-                widen(s, cfg, CLOCK + system, 1e6)
+                widen(s, cfg, CLOCK + system, 1e6, trail)
     for system in range(SYSTEMS):
         if g["known"][system] == 1:
             continue
@@ -225,7 +233,7 @@ def meet_clocks(
                     n += 1
         if n > 0:
             aux[CLOCK + system] = median(scratch, n)
-            widen(s, cfg, CLOCK + system, 1e6)
+            widen(s, cfg, CLOCK + system, 1e6, trail)
             g["known"][system] = 1
     return shift
 
@@ -312,7 +320,7 @@ def use_dopplers(
         if n == 0:
             return
         aux[DRIFT] = median(scratch, n)
-        widen(s, cfg, DRIFT, 1e4)
+        widen(s, cfg, DRIFT, 1e4, work["trail"])
         g["drift_known"] = 1
     begin_update(s, cfg, work)
     for k in range(rows.shape[0]):
@@ -382,7 +390,7 @@ def use_phase_changes(
                 return 0
             # The receiver's clock moved by what most phases say.
             aux[CHANGE] = median(scratch, n)
-            widen(s, cfg, CHANGE, 1e2)
+            widen(s, cfg, CHANGE, 1e2, work["trail"])
             begin_update(s, cfg, work)
             n = 0
         for k in range(rows.shape[0]):
@@ -437,8 +445,9 @@ def use_phase_changes(
 
 @njit(cache=True)
 def remember(
-    s: Record, g: Record, cfg: Record, tcfg: Record, epoch: Record, rows: Array, x: Array
-) -> None:
+    s: Record, g: Record, cfg: Record, tcfg: Record, work: Record, epoch: Record, rows: Array,
+    x: Array,
+) -> None:  # fmt: skip
     """Keep the phases of this epoch, and clone the antenna's position `x` (3,)."""
     for k in range(rows.shape[0]):
         row = rows[k]
@@ -455,6 +464,8 @@ def remember(
     P, n, first = s["P"], total_count(s, cfg), state_count(cfg) + CLONE
     lever, C = tcfg["lever"], s["nav"]["C"]
     a0, a1, a2 = rotate3(C, lever[0], lever[1], lever[2])
+    if work["trail"]["on"] == 1:
+        copy_antenna(work["trail"], first, a0, a1, a2)
     for i in range(3):
         s["aux"][CLONE + i] = x[i]
         # Row of G: the unit vector on position, a x e on attitude.

@@ -26,6 +26,7 @@ from replay.kernels.rotation import (
     quaternion_normalize,
     rotate3,
 )
+from replay.kernels.transition import add_correction, open_node
 from replay.kernels.types import Array, Record
 
 
@@ -196,14 +197,18 @@ def update(
         )
     if not accepted:
         return False
-    dx = work["dx"]
+    dx, trail = work["dx"], work["trail"]
     for i in range(n):
         dx[i] = 0.0
+    if trail["on"] == 1:
+        open_node(trail, P, n)
     if not whitened_update(
         P, n, H, index, count, z, R, k, dx, L, work["h"], work["b"], work["gain"]
     ):
         return False
     feed_back(s, cfg, dx, work["q"])
+    if trail["on"] == 1:
+        add_correction(trail, dx, n)
     return True
 
 

@@ -145,7 +145,7 @@ class FilterCovariance(_message.Message):
     def __init__(self, dimension: _Optional[int] = ..., state_names: _Optional[str] = ..., upper_triangle: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class FilterTransition(_message.Message):
-    __slots__ = ("since_ns", "dimension_before", "dimension", "state_names", "row", "column", "value", "predicted_upper_triangle", "correction", "updated_upper_triangle")
+    __slots__ = ("since_ns", "dimension_before", "dimension", "state_names", "row", "column", "value", "predicted_upper_triangle", "correction", "updated_upper_triangle", "estimate", "q_body_to_ecef", "solution")
     SINCE_NS_FIELD_NUMBER: _ClassVar[int]
     DIMENSION_BEFORE_FIELD_NUMBER: _ClassVar[int]
     DIMENSION_FIELD_NUMBER: _ClassVar[int]
@@ -156,6 +156,9 @@ class FilterTransition(_message.Message):
     PREDICTED_UPPER_TRIANGLE_FIELD_NUMBER: _ClassVar[int]
     CORRECTION_FIELD_NUMBER: _ClassVar[int]
     UPDATED_UPPER_TRIANGLE_FIELD_NUMBER: _ClassVar[int]
+    ESTIMATE_FIELD_NUMBER: _ClassVar[int]
+    Q_BODY_TO_ECEF_FIELD_NUMBER: _ClassVar[int]
+    SOLUTION_FIELD_NUMBER: _ClassVar[int]
     since_ns: int
     dimension_before: int
     dimension: int
@@ -166,7 +169,10 @@ class FilterTransition(_message.Message):
     predicted_upper_triangle: _containers.RepeatedScalarFieldContainer[float]
     correction: _containers.RepeatedScalarFieldContainer[float]
     updated_upper_triangle: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, since_ns: _Optional[int] = ..., dimension_before: _Optional[int] = ..., dimension: _Optional[int] = ..., state_names: _Optional[str] = ..., row: _Optional[_Iterable[int]] = ..., column: _Optional[_Iterable[int]] = ..., value: _Optional[_Iterable[float]] = ..., predicted_upper_triangle: _Optional[_Iterable[float]] = ..., correction: _Optional[_Iterable[float]] = ..., updated_upper_triangle: _Optional[_Iterable[float]] = ...) -> None: ...
+    estimate: _containers.RepeatedScalarFieldContainer[float]
+    q_body_to_ecef: _containers.RepeatedScalarFieldContainer[float]
+    solution: int
+    def __init__(self, since_ns: _Optional[int] = ..., dimension_before: _Optional[int] = ..., dimension: _Optional[int] = ..., state_names: _Optional[str] = ..., row: _Optional[_Iterable[int]] = ..., column: _Optional[_Iterable[int]] = ..., value: _Optional[_Iterable[float]] = ..., predicted_upper_triangle: _Optional[_Iterable[float]] = ..., correction: _Optional[_Iterable[float]] = ..., updated_upper_triangle: _Optional[_Iterable[float]] = ..., estimate: _Optional[_Iterable[float]] = ..., q_body_to_ecef: _Optional[_Iterable[float]] = ..., solution: _Optional[int] = ...) -> None: ...
 
 class Innovation(_message.Message):
     __slots__ = ("kind", "axis", "satellite", "signal", "innovation", "innovation_std", "measurement_std", "normalized", "accepted")

@@ -7,7 +7,7 @@ log. Where the log is cut into blocks must not change a bit of what it writes.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final, Protocol, TypeVar
 
 import numpy as np
@@ -82,10 +82,14 @@ class Context:
         Inputs and outputs.
     heads : mapping of Port.name to Columns
         The first rows of each recorded input, however the log is cut: for nominal intervals.
+    backwards : callable, optional
+        Given the Port.name of a recorded input, all its rows in slices, the last slice first:
+        for a stage that must know the end before it begins. What it finds it keeps on disk.
     """
 
     topics: Mapping[str, str]
     heads: Mapping[str, Columns]
+    backwards: Callable[[str], Iterator[Columns]] | None = None
 
 
 Block = Mapping[str, Columns]

@@ -24,14 +24,16 @@ from replay.stages.inertial_columns import (
     solution_columns,
     state_columns,
 )
-from replay.stages.inertial_settings import config_record, names_of, require_room
+from replay.stages.inertial_settings import config_record, name_of, names_of, require_room
 from replay.stages.loose_config import LooseConfig
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import SAMPLE_TYPES, HeldSamples
 
 Array = np.ndarray[Any, Any]
 
 _NS: Final = 1_000_000_000
 _EVENT_ROOM: Final = 4096
+_CLONE_NAMES: Final = ("clone_ecef_x", "clone_ecef_y", "clone_ecef_z")
 
 
 @dataclasses.dataclass(slots=True)
@@ -42,14 +44,21 @@ class LooseState(HeldSamples):
     config: Array
     filter: Array
     pending: Array  # fixes that wait for a sample after them
+    recorder: Recorder
 
 
 class GnssInsLoose:
-    """The stage `gnss-ins-lc`."""
+    """The stage `gnss-ins-lc`.
+
+    Parameters
+    ----------
+    record : bool
+        Whether it writes transitions for a smoother.
+    """
 
     spec = StageSpec(
         name="gnss-ins-lc",
-        version=1,
+        version=2,
         inputs=(Port(channels.IMU), Port(channels.GNSS_FIX)),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
@@ -61,6 +70,10 @@ class GnssInsLoose:
         trigger=Port(channels.GNSS_FIX),
     )
 
+    def __init__(self, record: bool = False) -> None:
+        self.spec = recording(type(self).spec, record)
+        self._record = record
+
     def start(self, config: Section, context: Context) -> LooseState:
         """State before the first row."""
         if not isinstance(config, LooseConfig):
@@ -71,6 +84,9 @@ class GnssInsLoose:
             config=record,
             filter=records.new_state(),
             pending=np.zeros(0, dtype=records.FIX_DTYPE),
+            recorder=Recorder(
+                records.MAX_STATES, self._record, name_of(names_of(record), _CLONE_NAMES)
+            ),
         )
 
     def step(self, state: LooseState, block: Block) -> tuple[LooseState, Outputs]:
@@ -100,39 +116,21 @@ class GnssInsLoose:
 
     def dump(self, state: LooseState) -> bytes:
         """State as bytes."""
-        return dump_arrays({name: getattr(state, name) for name in _dump_types()})
+        own = {name: getattr(state, name) for name in _dump_types()}
+        return dump_arrays({**own, **state.recorder.arrays()})
 
     def restore(self, state: LooseState, data: bytes) -> LooseState:
         """State of a dump."""
-        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
-        return dataclasses.replace(state, **arrays)
+        arrays: dict[str, Any] = restore_arrays(data, {**_dump_types(), **state.recorder.types()})
+        recorder = state.recorder.restored(arrays)
+        return dataclasses.replace(state, recorder=recorder, **arrays)
 
     def _run(self, state: LooseState, ready: int) -> Outputs:
-        samples, fixes = ready, len(state.pending)
-        names = names_of(state.config)
-        states = len(names)
-        # Rows that a block can give at most: predictions, one before and one at each fix.
-        solutions = np.zeros(samples + 2 * fixes, dtype=records.SOLUTION_DTYPE)
-        epochs = np.zeros(fixes, dtype=records.EPOCH_DTYPE)
-        covariances = np.zeros((fixes, states * (states + 1) // 2))
-        innovations = np.zeros(8 * samples + 6 * fixes, dtype=records.INNOVATION_DTYPE)
-        events = np.zeros(3 * (samples + fixes) + _EVENT_ROOM, dtype=records.EVENT_DTYPE)
-        counts = np.zeros(5, dtype=np.int64)
-        taken = loose.run_block(
+        recorder, names = state.recorder, names_of(state.config)
+        taken, solutions, epochs, covariances, innovations, events, counts = recorder.run(
+            lambda nodes: self._filter(state, ready, len(names), nodes),
             state.filter,
-            state.config,
-            np.zeros(1, dtype=records.WORK_DTYPE),
-            state.held_t[:ready],
-            state.held_log_t[:ready],
-            state.held_w[:ready],
-            state.held_f[:ready],
-            state.pending,
-            solutions,
-            epochs,
-            covariances,
-            innovations,
-            events,
-            counts,
+            recorder.trail,
         )
         require_room(int(counts[4]), self.spec.name)
         state.release(ready)
@@ -146,8 +144,43 @@ class GnssInsLoose:
             ),
             channels.FILTER_EVENTS.name: event_columns(events[: counts[3]]),
             channels.SOLUTION.name: solution_columns(solutions[: counts[0]]),
+            **recorder.outputs(),
         }
         return {name: rows for name, rows in outputs.items() if len(rows)}
+
+    @staticmethod
+    def _filter(
+        state: LooseState, ready: int, states: int, nodes: Nodes
+    ) -> tuple[int, Array, Array, Array, Array, Array, Array]:
+        """The compiled loop over the rows at hand: fixes taken, and rows of the outputs."""
+        samples, fixes = ready, len(state.pending)
+        # Rows that a block can give at most: predictions, one before and one at each fix.
+        solutions = np.zeros(samples + 2 * fixes, dtype=records.SOLUTION_DTYPE)
+        epochs = np.zeros(fixes, dtype=records.EPOCH_DTYPE)
+        covariances = np.zeros((fixes, states * (states + 1) // 2))
+        innovations = np.zeros(8 * samples + 6 * fixes, dtype=records.INNOVATION_DTYPE)
+        events = np.zeros(3 * (samples + fixes) + _EVENT_ROOM, dtype=records.EVENT_DTYPE)
+        counts = np.zeros(5, dtype=np.int64)
+        work = state.recorder.lend(np.zeros(1, dtype=records.WORK_DTYPE))
+        taken = loose.run_block(
+            state.filter,
+            state.config,
+            work,
+            state.held_t[:ready],
+            state.held_log_t[:ready],
+            state.held_w[:ready],
+            state.held_f[:ready],
+            state.pending,
+            solutions,
+            epochs,
+            covariances,
+            innovations,
+            events,
+            counts,
+            nodes,
+        )
+        state.recorder.take_back(work)
+        return taken, solutions, epochs, covariances, innovations, events, counts
 
 
 def _dump_types() -> dict[str, np.dtype[Any]]:

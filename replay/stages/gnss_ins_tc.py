@@ -18,7 +18,7 @@ from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import records, tight, tight_records
-from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE
+from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.log.columns import Columns, concatenate
@@ -39,10 +39,11 @@ from replay.stages.inertial_columns import (
     solution_columns,
     state_columns,
 )
-from replay.stages.inertial_settings import config_record, names_of, require_room
+from replay.stages.inertial_settings import config_record, name_of, names_of, require_room
 from replay.stages.loose_config import Gnss, LooseConfig
 from replay.stages.spp import single_config
 from replay.stages.tight_config import TightConfig
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import SAMPLE_TYPES, HeldSamples, forget_epochs, join_epochs, read_epochs
 
 Array = np.ndarray[Any, Any]
@@ -50,6 +51,12 @@ Array = np.ndarray[Any, Any]
 _NS: Final = 1_000_000_000
 _EVENT_ROOM: Final = 4096
 _STATES: Final = tight_records.TIGHT_STATES
+_EXTRA_NAMES: Final = (
+    *(f"clock_{letter}" for letter in SYSTEM_LETTERS),
+    "clock_drift",
+    *(f"clone_ecef_{axis}" for axis in "xyz"),
+    "clock_change",
+)
 
 
 @dataclasses.dataclass(slots=True)
@@ -64,14 +71,21 @@ class TightState(HeldSamples):
     tight: Array
     epochs: Array  # that wait for a sample after them
     rows: Array
+    recorder: Recorder
 
 
 class TightInertial:
-    """The stage `gnss-ins-tc`."""
+    """The stage `gnss-ins-tc`.
+
+    Parameters
+    ----------
+    record : bool
+        Whether it writes transitions for a smoother.
+    """
 
     spec = StageSpec(
         name="gnss-ins-tc",
-        version=1,
+        version=2,
         inputs=(
             Port(channels.IMU),
             Port(channels.GNSS_OBS),
@@ -91,19 +105,25 @@ class TightInertial:
         trigger=Port(channels.GNSS_OBS),
     )
 
+    def __init__(self, record: bool = False) -> None:
+        self.spec = recording(type(self).spec, record)
+        self._record = record
+
     def start(self, config: Section, context: Context) -> TightState:
         """State before the first row."""
         if not isinstance(config, TightConfig):
             raise TypeError("gnss-ins-tc takes a TightConfig")
+        inertial = inertial_config(config, context)
         return TightState(
             settings=config,
             selection=select_signals(config.gnss.signals, config.gnss.systems),
-            config=inertial_config(config, context),
+            config=inertial,
             tight_config=tight_record(config),
             filter=records.new_state(_STATES),
             tight=tight_records.new_tight_state(),
             epochs=np.zeros(0, dtype=EPOCH_DTYPE),
             rows=np.zeros(0, dtype=MEASURED_DTYPE),
+            recorder=Recorder(_STATES, self._record, name_of(names_of(inertial), _EXTRA_NAMES)),
         )
 
     def step(self, state: TightState, block: Block) -> tuple[TightState, Outputs]:
@@ -127,17 +147,52 @@ class TightInertial:
 
     def dump(self, state: TightState) -> bytes:
         """State as bytes."""
-        return dump_arrays({name: getattr(state, name) for name in _dump_types()})
+        own = {name: getattr(state, name) for name in _dump_types()}
+        return dump_arrays({**own, **state.recorder.arrays()})
 
     def restore(self, state: TightState, data: bytes) -> TightState:
         """State of a dump."""
-        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
-        return dataclasses.replace(state, **arrays)
+        arrays: dict[str, Any] = restore_arrays(data, {**_dump_types(), **state.recorder.types()})
+        recorder = state.recorder.restored(arrays)
+        return dataclasses.replace(state, recorder=recorder, **arrays)
 
     def _run(self, state: TightState, ready: int) -> Outputs:
+        recorder, names = state.recorder, names_of(state.config)
+        taken, rows = recorder.run(
+            lambda nodes: self._filter(state, ready, len(names), nodes),
+            state.filter,
+            state.tight,
+            recorder.trail,
+        )
+        solutions, epochs, covariances, innovations, events, counts, _ = rows[:7]
+        satellites, residuals, tally = rows[7:]
+        require_room(int(counts[4]), self.spec.name)
+        state.release(ready)
+        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
+        epochs, satellites = epochs[: counts[1]], satellites[: tally[1]]
+        outputs = {
+            channels.FILTER_INNOVATIONS.name: by_time(
+                residual_columns(residuals[: tally[0]]),
+                innovation_columns(innovations[: counts[2]]),
+            ),
+            channels.FILTER_CLOCKS.name: clock_columns(satellites),
+            channels.FILTER_GEOMETRY.name: geometry_columns(satellites),
+            channels.FILTER_STATE.name: state_columns(epochs),
+            channels.FILTER_COVARIANCE.name: covariance_columns(
+                epochs, covariances[: counts[1]], names
+            ),
+            channels.FILTER_EVENTS.name: event_columns(events[: counts[3]]),
+            channels.SOLUTION.name: solution_columns(solutions[: counts[0]]),
+            **recorder.outputs(),
+        }
+        return {name: rows for name, rows in outputs.items() if len(rows)}
+
+    @staticmethod
+    def _filter(
+        state: TightState, ready: int, states: int, nodes: Nodes
+    ) -> tuple[int, tuple[Any, ...]]:
+        """The compiled loop over the rows at hand: epochs taken, and rows of the outputs."""
         count = len(state.epochs)
-        names = names_of(state.config)
-        states = len(names)
         # Rows that a block can give at most: predictions, one before and one at each epoch.
         solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
         epochs = np.zeros(count, dtype=records.EPOCH_DTYPE)
@@ -148,12 +203,17 @@ class TightInertial:
         satellites = np.zeros(count, dtype=SINGLE_ROW_DTYPE)
         residuals = np.zeros(5 * len(state.rows), dtype=RESIDUAL_DTYPE)
         tally = np.zeros(2, dtype=np.int64)
+        work = state.recorder.lend(np.zeros(1, dtype=records.work_dtype(_STATES)))
+        out = (
+            solutions, epochs, covariances, innovations, events, counts, nodes,
+            satellites, residuals, tally,
+        )  # fmt: skip
         taken = tight.run_tight(
             state.filter,
             state.tight,
             state.config,
             state.tight_config,
-            np.zeros(1, dtype=records.work_dtype(_STATES)),
+            work,
             np.zeros(1, dtype=SOLVE_DTYPE),
             state.held_t[:ready],
             state.held_log_t[:ready],
@@ -161,28 +221,10 @@ class TightInertial:
             state.held_f[:ready],
             state.epochs,
             state.rows,
-            (
-                solutions, epochs, covariances, innovations, events, counts,
-                satellites, residuals, tally,
-            ),
-        )  # fmt: skip
-        require_room(int(counts[4]), self.spec.name)
-        state.release(ready)
-        state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
-        epochs, satellites = epochs[: counts[1]], satellites[: tally[1]]
-        outputs = {
-            channels.FILTER_INNOVATIONS: by_time(
-                residual_columns(residuals[: tally[0]]),
-                innovation_columns(innovations[: counts[2]]),
-            ),
-            channels.FILTER_CLOCKS: clock_columns(satellites),
-            channels.FILTER_GEOMETRY: geometry_columns(satellites),
-            channels.FILTER_STATE: state_columns(epochs),
-            channels.FILTER_COVARIANCE: covariance_columns(epochs, covariances[: counts[1]], names),
-            channels.FILTER_EVENTS: event_columns(events[: counts[3]]),
-            channels.SOLUTION: solution_columns(solutions[: counts[0]]),
-        }
-        return {channel.name: rows for channel, rows in outputs.items() if len(rows)}
+            out,
+        )
+        state.recorder.take_back(work)
+        return taken, out
 
 
 def by_time(first: Columns, second: Columns) -> Columns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +11,7 @@ from replay import channels
 from replay.errors import ConfigurationError, DataError
 from replay.ins.states import state_names
 from replay.kernels import records
+from replay.kernels.output_rows import EXTRA_NAME
 from replay.stages.base import Context
 from replay.stages.loose_config import LooseConfig
 
@@ -115,6 +117,15 @@ def names_of(record: Array) -> tuple[str, ...]:
         lever=bool(record["lever"][0]),
         squat=bool(record["squat"][0]),
     )
+
+
+def name_of(names: Sequence[str], extras: Sequence[str] = ()) -> Callable[[int], str]:
+    """Name of a state by the number that an inertial filter gives it in a node."""
+
+    def find(number: int) -> str:
+        return names[number] if number < EXTRA_NAME else extras[number - EXTRA_NAME]
+
+    return find
 
 
 def require_room(lost: int, stage: str) -> None:

@@ -14,8 +14,9 @@ import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.gnss.measurements import Selection, select_signals
+from replay.gnss.measurements import Epochs, Selection, select_signals
 from replay.kernels import kinematic
+from replay.kernels.gnss_records import SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
 from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
@@ -39,10 +40,16 @@ from replay.stages.gnss_columns import (
 )
 from replay.stages.spp import single_config
 from replay.stages.spp_config import KfsppConfig
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import read_epochs
 
 Array = np.ndarray[Any, Any]
 
+_NAMES: Final = (
+    *(f"{kind}_ecef_{axis}" for kind in ("position", "velocity") for axis in "xyz"),
+    *(f"clock_{letter}" for letter in SYSTEM_LETTERS),
+    *(f"clock_drift_{letter}" for letter in SYSTEM_LETTERS),
+)
 _TEXT: Final = {
     **EVENT_TEXT,
     kinematic.EVENT_CLOCK_JUMP: "the receiver set its clock by {value:.3f} m",
@@ -59,10 +66,17 @@ class KfsppState:
     config: Array
     kernel: Array
     scratch: Array
+    recorder: Recorder
 
 
 class FilteredSinglePoint:
-    """The stage `kfspp`."""
+    """The stage `kfspp`.
+
+    Parameters
+    ----------
+    record : bool
+        Whether it writes transitions for a smoother.
+    """
 
     spec = StageSpec(
         name="kfspp",
@@ -83,6 +97,10 @@ class FilteredSinglePoint:
         trigger=Port(channels.GNSS_OBS),
     )
 
+    def __init__(self, record: bool = False) -> None:
+        self.spec = recording(type(self).spec, record)
+        self._record = record
+
     def start(self, config: Section, context: Context) -> KfsppState:
         """State before the first row."""
         if not isinstance(config, KfsppConfig):
@@ -102,6 +120,7 @@ class FilteredSinglePoint:
             config=record,
             kernel=kernel,
             scratch=np.zeros(1, dtype=SOLVE_DTYPE),
+            recorder=Recorder(kinematic.STATES, self._record, _NAMES.__getitem__),
         )
 
     def step(self, state: KfsppState, block: Block) -> tuple[KfsppState, Outputs]:
@@ -109,14 +128,10 @@ class FilteredSinglePoint:
         found = read_epochs(block, state.selection)
         if found is None:
             return state, {}
-        solutions = np.zeros(len(found.epochs), dtype=SINGLE_ROW_DTYPE)
-        innovations = np.zeros(2 * len(found.rows), dtype=RESIDUAL_DTYPE)
-        notes = np.zeros(2 * len(found.epochs), dtype=NOTE_DTYPE)
-        counts = np.zeros(3, dtype=np.int64)
-        kinematic.run_kinematic(
-            state.kernel, state.config, found.epochs, found.rows, state.scratch,
-            solutions, innovations, notes, counts,
-        )  # fmt: skip
+        recorder = state.recorder
+        solutions, innovations, notes, counts = recorder.run(
+            lambda nodes: self._filter(state, found, nodes), state.kernel, recorder.trail
+        )
         solved = solutions[: counts[0]]
         solved["status"] = np.where(
             solved["status"] > 0,
@@ -124,13 +139,29 @@ class FilteredSinglePoint:
             solution_pb2.SOLUTION_STATUS_PREDICTED,
         )
         columns = {
-            channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[1]]),
-            channels.FILTER_CLOCKS: clock_columns(solved),
-            channels.FILTER_GEOMETRY: geometry_columns(solved),
-            channels.FILTER_EVENTS: event_columns(notes[: counts[2]], _TEXT),
-            channels.SOLUTION: antenna_solution_columns(solved),
+            channels.FILTER_INNOVATIONS.name: residual_columns(innovations[: counts[1]]),
+            channels.FILTER_CLOCKS.name: clock_columns(solved),
+            channels.FILTER_GEOMETRY.name: geometry_columns(solved),
+            channels.FILTER_EVENTS.name: event_columns(notes[: counts[2]], _TEXT),
+            channels.SOLUTION.name: antenna_solution_columns(solved),
+            **recorder.outputs(),
         }
-        return state, {channel.name: rows for channel, rows in columns.items() if len(rows)}
+        return state, {name: rows for name, rows in columns.items() if len(rows)}
+
+    @staticmethod
+    def _filter(
+        state: KfsppState, found: Epochs, nodes: Nodes
+    ) -> tuple[Array, Array, Array, Array]:
+        """The compiled loop over the epochs at hand: solutions, innovations, notes, counts."""
+        solutions = np.zeros(len(found.epochs), dtype=SINGLE_ROW_DTYPE)
+        innovations = np.zeros(2 * len(found.rows), dtype=RESIDUAL_DTYPE)
+        notes = np.zeros(2 * len(found.epochs), dtype=NOTE_DTYPE)
+        counts = np.zeros(3, dtype=np.int64)
+        kinematic.run_kinematic(
+            state.kernel, state.config, found.epochs, found.rows, state.scratch,
+            solutions, innovations, notes, counts, state.recorder.trail, nodes,
+        )  # fmt: skip
+        return solutions, innovations, notes, counts
 
     def finish(self, state: KfsppState) -> Outputs:
         """Nothing is left to say."""
@@ -138,9 +169,11 @@ class FilteredSinglePoint:
 
     def dump(self, state: KfsppState) -> bytes:
         """The state as bytes."""
-        return dump_arrays({"kernel": state.kernel})
+        return dump_arrays({"kernel": state.kernel, **state.recorder.arrays()})
 
     def restore(self, state: KfsppState, data: bytes) -> KfsppState:
         """The state of a dump."""
-        arrays = restore_arrays(data, {"kernel": kinematic.KINEMATIC_STATE_DTYPE})
-        return dataclasses.replace(state, kernel=arrays["kernel"])
+        types = {"kernel": kinematic.KINEMATIC_STATE_DTYPE, **state.recorder.types()}
+        arrays = restore_arrays(data, types)
+        recorder = state.recorder.restored(arrays)
+        return dataclasses.replace(state, kernel=arrays["kernel"], recorder=recorder)

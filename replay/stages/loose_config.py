@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from replay.configuration import Section, quantity
+from replay.stages.smoothing_config import Smoothing
 
 
 class Filter(Section, frozen=True):
@@ -138,6 +139,7 @@ class NonHolonomic(Section, frozen=True):
 class Imu(Section, frozen=True):
     """What is said of the inertial channel."""
 
+    name: str = ""  # of /imu/NAME/raw; empty is /imu/raw
     interval: Annotated[float, quantity("s", "nominal; 0 takes the median of the log")] = 0.0
     gap: Annotated[float, quantity("s", "interval that is a gap; 0 is 5 nominal ones")] = 0.0
 
@@ -159,3 +161,4 @@ class LooseConfig(Section, frozen=True):
     non_holonomic: NonHolonomic = NonHolonomic()
     imu: Imu = Imu()
     output: Output = Output()
+    smoothing: Smoothing = Smoothing()

@@ -43,6 +43,7 @@ from replay.stages.rtk_columns import (
     RTK_EVENT_TEXT,
     ambiguity_columns,
     baseline_columns,
+    difference_name,
     resolution_columns,
 )
 from replay.stages.rtk_config import RtkConfig
@@ -50,6 +51,7 @@ from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
 from replay.stages.spp_config import WEIGHTINGS
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import (
     EPOCH_READS,
     EPOCH_TYPES,
@@ -61,6 +63,9 @@ from replay.stages.waiting import (
 Array = np.ndarray[Any, Any]
 
 _NS: Final = 1_000_000_000
+_MOTION: Final = tuple(
+    f"{kind}_ecef_{axis}" for kind in ("position", "velocity", "acceleration") for axis in "xyz"
+)
 _DYNAMICS: Final = ("static", "kinematic", "velocity", "acceleration")
 _MODES: Final = ("instantaneous", "continuous", "fix-and-hold", "float")
 _TESTS: Final = ("ratio", "w-ratio")
@@ -78,6 +83,7 @@ class RtkState(HeldEpochs):
     kernel: Array
     x: Array
     P: Array
+    recorder: Recorder
 
 
 class Rtk:
@@ -87,12 +93,15 @@ class Rtk:
     ----------
     corrected : bool
         Whether a network of stations tells the rover's errors against the base.
+    record : bool
+        Whether it writes transitions for a smoother.
     """
 
-    def __init__(self, corrected: bool = False) -> None:
+    def __init__(self, corrected: bool = False, record: bool = False) -> None:
         self.corrected = corrected
+        self._record = record
         network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
-        self.spec = StageSpec(
+        spec = StageSpec(
             name="rtk",
             version=2,
             inputs=(
@@ -110,6 +119,7 @@ class Rtk:
             ),
             trigger=Port(channels.GNSS_OBS),
         )
+        self.spec = recording(spec, record)
 
     def start(self, config: Section, context: Context) -> RtkState:
         """State before the first row."""
@@ -126,6 +136,7 @@ class Rtk:
             kernel=rtk_records.new_rtk_state(),
             x=np.zeros(rtk_records.ROOM),
             P=np.zeros((rtk_records.ROOM, rtk_records.ROOM)),
+            recorder=Recorder(rtk_records.ROOM, self._record, _name_of),
         )
 
     def step(self, state: RtkState, block: Block) -> tuple[RtkState, Outputs]:
@@ -151,17 +162,19 @@ class Rtk:
                 **{name: getattr(state, name) for name in _dump_types()},
                 "x": state.x[:n],
                 "P": state.P[:n, :n],
+                **state.recorder.arrays(),
             }
         )
 
     def restore(self, state: RtkState, data: bytes) -> RtkState:
         """The state of a dump."""
-        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
+        arrays: dict[str, Any] = restore_arrays(data, {**_dump_types(), **state.recorder.types()})
+        recorder = state.recorder.restored(arrays)
         n = int(arrays["kernel"]["n"][0])
         x, P = np.zeros_like(state.x), np.zeros_like(state.P)
         x[:n] = arrays["x"]
         P[:n, :n] = arrays["P"]
-        return dataclasses.replace(state, **{**arrays, "x": x, "P": P})
+        return dataclasses.replace(state, **{**arrays, "x": x, "P": P, "recorder": recorder})
 
     @staticmethod
     def _match(state: RtkState, now: int, *, wait: int) -> tuple[Array, Array, int]:
@@ -178,6 +191,32 @@ class Rtk:
             state.forget_unasked(state.times[2])
             return {}
         state.late_corrections(release[:ready])
+        recorder = state.recorder
+        found = recorder.run(
+            lambda nodes: self._filter(state, ready, partner, release, nodes),
+            state.kernel, state.x, state.P, recorder.trail,
+        )  # fmt: skip
+        solutions, baselines, innovations, ambiguities, resolutions, notes, counts = found
+        state.released[0] = release[ready - 1]
+        state.forget(ready)
+        state.forget_unasked(state.times[2])
+        columns: dict[str, Columns] = {
+            channels.FILTER_INNOVATIONS.name: residual_columns(innovations[: counts[2]]),
+            channels.FILTER_GEOMETRY.name: geometry_columns(solutions[: counts[0]]),
+            channels.FILTER_AMBIGUITIES.name: ambiguity_columns(ambiguities[: counts[3]]),
+            channels.FILTER_RESOLUTION.name: resolution_columns(resolutions[: counts[4]]),
+            channels.RELATIVE_POSITION.name: baseline_columns(baselines[: counts[1]]),
+            channels.FILTER_EVENTS.name: event_columns(notes[: counts[5]], RTK_EVENT_TEXT),
+            channels.SOLUTION.name: antenna_solution_columns(solutions[: counts[0]]),
+            **recorder.outputs(),
+        }
+        return {name: rows for name, rows in columns.items() if len(rows)}
+
+    @staticmethod
+    def _filter(
+        state: RtkState, ready: int, partner: Array, release: Array, nodes: Nodes
+    ) -> tuple[Array, ...]:
+        """The compiled loop over the first `ready` epochs: outputs and their counts."""
         epochs = state.epochs[:ready]
         end = int(epochs["first"][-1] + epochs["count"][-1])
         solutions = np.zeros(ready, dtype=single_point.SINGLE_ROW_DTYPE)
@@ -192,21 +231,9 @@ class Rtk:
             state.kernel, state.x, state.P, state.config, state.single,
             np.zeros(1, dtype=SOLVE_DTYPE), epochs, state.rows, state.base_epochs,
             state.base_rows, partner, release, solutions, baselines, innovations, ambiguities,
-            resolutions, notes, counts,
+            resolutions, notes, counts, state.recorder.trail, nodes,
         )  # fmt: skip
-        state.released[0] = release[ready - 1]
-        state.forget(ready)
-        state.forget_unasked(state.times[2])
-        columns: dict[channels.ChannelSpec, Columns] = {
-            channels.FILTER_INNOVATIONS: residual_columns(innovations[: counts[2]]),
-            channels.FILTER_GEOMETRY: geometry_columns(solutions[: counts[0]]),
-            channels.FILTER_AMBIGUITIES: ambiguity_columns(ambiguities[: counts[3]]),
-            channels.FILTER_RESOLUTION: resolution_columns(resolutions[: counts[4]]),
-            channels.RELATIVE_POSITION: baseline_columns(baselines[: counts[1]]),
-            channels.FILTER_EVENTS: event_columns(notes[: counts[5]], RTK_EVENT_TEXT),
-            channels.SOLUTION: antenna_solution_columns(solutions[: counts[0]]),
-        }
-        return {channel.name: rows for channel, rows in columns.items() if len(rows)}
+        return solutions, baselines, innovations, ambiguities, resolutions, notes, counts
 
 
 class MovingBaseSatellites(Satellites):
@@ -218,6 +245,11 @@ class MovingBaseSatellites(Satellites):
     def start(self, config: Section, context: Context) -> Any:
         """State before the first row: the base finds its own coarse position."""
         return Satellites(RECEIVER).start(config, context)
+
+
+def _name_of(number: int) -> str:
+    """Name of a state by the number that the filter gives it in a node."""
+    return _MOTION[number] if number < len(_MOTION) else difference_name(number)
 
 
 def _dump_types() -> dict[str, np.dtype[Any]]:

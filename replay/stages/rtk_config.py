@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from replay.configuration import Section, quantity
+from replay.stages.smoothing_config import Smoothing
 from replay.stages.spp_config import SppConfig, Weighting
 
 
@@ -101,6 +102,7 @@ class RtkConfig(SppConfig, frozen=True):
     name: str = "rtk"
     base: Base = Base()
     rtk: Rtk = Rtk()
+    smoothing: Smoothing = Smoothing()
 
     def distance_noise(self) -> float:
         """Deviation of what grows with the distance (m/m), where nothing takes it off."""

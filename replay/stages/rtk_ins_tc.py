@@ -46,9 +46,15 @@ from replay.stages.inertial_columns import (
 )
 from replay.stages.inertial_settings import names_of, require_room
 from replay.stages.rtk import rtk_config
-from replay.stages.rtk_columns import RTK_EVENT_TEXT, ambiguity_columns, resolution_columns
+from replay.stages.rtk_columns import (
+    RTK_EVENT_TEXT,
+    ambiguity_columns,
+    difference_name,
+    resolution_columns,
+)
 from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.spp import single_config
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, SAMPLE_TYPES, HeldEpochs, HeldSamples
 
 Array = np.ndarray[Any, Any]
@@ -70,6 +76,7 @@ class RtkInsState(HeldSamples, HeldEpochs):
     rtk_config: Array
     filter: Array
     kernel: Array
+    recorder: Recorder
 
 
 class RtkInertial:
@@ -79,14 +86,17 @@ class RtkInertial:
     ----------
     corrected : bool
         Whether a network of stations tells the rover's errors against the base.
+    record : bool
+        Whether it writes transitions for a smoother.
     """
 
-    def __init__(self, corrected: bool = False) -> None:
+    def __init__(self, corrected: bool = False, record: bool = False) -> None:
         self.corrected = corrected
+        self._record = record
         network = (Port(channels.NETWORK_CORRECTIONS),) if corrected else ()
-        self.spec = StageSpec(
+        spec = StageSpec(
             name="rtk-ins-tc",
-            version=2,
+            version=3,
             inputs=(
                 Port(channels.IMU),
                 *(Port(channel, role) for role in (RECEIVER, BASE) for channel in EPOCH_READS),
@@ -104,6 +114,7 @@ class RtkInertial:
             ),
             trigger=Port(channels.GNSS_OBS),
         )
+        self.spec = recording(spec, record)
 
     def start(self, config: Section, context: Context) -> RtkInsState:
         """State before the first row."""
@@ -114,14 +125,21 @@ class RtkInertial:
                 f"tight.latency of {config.tight.latency} s is less than base.wait",
                 mend="inertial rows must wait at least as long as an epoch waits for the base",
             )
+        inertial = inertial_config(config, context)
+        names = names_of(inertial)
         return RtkInsState(
             settings=config,
             selection=select_signals(config.gnss.signals, config.gnss.systems),
-            config=inertial_config(config, context),
+            config=inertial,
             tight_config=tight_record(config),
             rtk_config=rtk_config(config, single_config(config.gnss, config.spp), context),
             filter=records.new_state(_STATES),
             kernel=rtk_records.new_rtk_state(),
+            recorder=Recorder(
+                _STATES,
+                self._record,
+                lambda number: names[number] if number < len(names) else difference_name(number),
+            ),
         )
 
     def step(self, state: RtkInsState, block: Block) -> tuple[RtkInsState, Outputs]:
@@ -143,12 +161,14 @@ class RtkInertial:
 
     def dump(self, state: RtkInsState) -> bytes:
         """State as bytes."""
-        return dump_arrays({name: getattr(state, name) for name in _dump_types()})
+        own = {name: getattr(state, name) for name in _dump_types()}
+        return dump_arrays({**own, **state.recorder.arrays()})
 
     def restore(self, state: RtkInsState, data: bytes) -> RtkInsState:
         """State of a dump."""
-        arrays: dict[str, Any] = restore_arrays(data, _dump_types())
-        return dataclasses.replace(state, **arrays)
+        arrays: dict[str, Any] = restore_arrays(data, {**_dump_types(), **state.recorder.types()})
+        recorder = state.recorder.restored(arrays)
+        return dataclasses.replace(state, recorder=recorder, **arrays)
 
     @staticmethod
     def _release(state: RtkInsState) -> tuple[Array, Array]:
@@ -177,32 +197,15 @@ class RtkInertial:
     def _run(self, state: RtkInsState) -> Outputs:
         epochs, partner = self._release(state)
         ready = state.ready(int(state.now[0]))
-        count = len(epochs)
-        end = int(epochs["first"][-1] + epochs["count"][-1]) if count else 0
-        names = names_of(state.config)
-        states = len(names)
-        solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
-        rows = np.zeros(count, dtype=records.EPOCH_DTYPE)
-        covariances = np.zeros((count, states * (states + 1) // 2))
-        innovations = np.zeros(8 * ready + 8, dtype=records.INNOVATION_DTYPE)
-        events = np.zeros(4 * (ready + count) + _EVENT_ROOM, dtype=records.EVENT_DTYPE)
-        counts = np.zeros(5, dtype=np.int64)
-        geometry = np.zeros(count, dtype=SINGLE_ROW_DTYPE)
-        residuals = np.zeros(2 * SLOTS * end, dtype=RESIDUAL_DTYPE)
-        ambiguities = np.zeros(SLOTS * end, dtype=rtk_records.AMBIGUITY_ROW_DTYPE)
-        resolutions = np.zeros(count, dtype=rtk_records.RESOLUTION_ROW_DTYPE)
-        notes = np.zeros(count * (4 + SLOTS * rtk_records.PAIRS), dtype=NOTE_DTYPE)
-        tally = np.zeros(6, dtype=np.int64)
-        taken = tight_rtk.run_tight_rtk(
-            state.filter, state.kernel, state.config, state.tight_config, state.rtk_config,
-            np.zeros(1, dtype=records.work_dtype(_STATES)), np.zeros(1, dtype=SOLVE_DTYPE),
-            state.held_t[:ready], state.held_log_t[:ready], state.held_w[:ready],
-            state.held_f[:ready], epochs, state.rows, state.base_epochs, state.base_rows, partner,
-            (
-                solutions, rows, covariances, innovations, events, counts,
-                geometry, residuals, ambiguities, resolutions, notes, tally,
-            ),
-        )  # fmt: skip
+        recorder, names = state.recorder, names_of(state.config)
+        taken, out = recorder.run(
+            lambda nodes: self._filter(state, ready, epochs, partner, len(names), nodes),
+            state.filter,
+            state.kernel,
+            recorder.trail,
+        )
+        solutions, rows, covariances, innovations, events, counts, _ = out[:7]
+        geometry, residuals, ambiguities, resolutions, notes, tally = out[7:]
         require_room(int(counts[4]), self.spec.name)
         if taken:
             state.released[0] = epochs["log_t"][taken - 1]
@@ -215,23 +218,60 @@ class RtkInertial:
             oldest -= LATE_NS + round(state.settings.base.max_age * _NS)
             state.forget_base(oldest)
         rows, geometry = rows[: counts[1]], geometry[: tally[0]]
-        columns: dict[channels.ChannelSpec, Columns] = {
-            channels.FILTER_INNOVATIONS: by_time(
+        columns: dict[str, Columns] = {
+            channels.FILTER_INNOVATIONS.name: by_time(
                 residual_columns(residuals[: tally[2]]),
                 innovation_columns(innovations[: counts[2]]),
             ),
-            channels.FILTER_GEOMETRY: geometry_columns(geometry),
-            channels.FILTER_AMBIGUITIES: ambiguity_columns(ambiguities[: tally[3]]),
-            channels.FILTER_RESOLUTION: resolution_columns(resolutions[: tally[4]]),
-            channels.FILTER_STATE: state_columns(rows),
-            channels.FILTER_COVARIANCE: covariance_columns(rows, covariances[: counts[1]], names),
-            channels.FILTER_EVENTS: by_time(
+            channels.FILTER_GEOMETRY.name: geometry_columns(geometry),
+            channels.FILTER_AMBIGUITIES.name: ambiguity_columns(ambiguities[: tally[3]]),
+            channels.FILTER_RESOLUTION.name: resolution_columns(resolutions[: tally[4]]),
+            channels.FILTER_STATE.name: state_columns(rows),
+            channels.FILTER_COVARIANCE.name: covariance_columns(
+                rows, covariances[: counts[1]], names
+            ),
+            channels.FILTER_EVENTS.name: by_time(
                 event_columns(events[: counts[3]]),
                 gnss_event_columns(notes[: tally[5]], RTK_EVENT_TEXT),
             ),
-            channels.SOLUTION: solution_columns(solutions[: counts[0]]),
+            channels.SOLUTION.name: solution_columns(solutions[: counts[0]]),
+            **recorder.outputs(),
         }
-        return {channel.name: found for channel, found in columns.items() if len(found)}
+        return {name: found for name, found in columns.items() if len(found)}
+
+    @staticmethod
+    def _filter(
+        state: RtkInsState, ready: int, epochs: Array, partner: Array, states: int, nodes: Nodes
+    ) -> tuple[int, tuple[Any, ...]]:
+        """The compiled loop over the rows at hand: epochs taken, and rows of the outputs."""
+        count = len(epochs)
+        end = int(epochs["first"][-1] + epochs["count"][-1]) if count else 0
+        solutions = np.zeros(ready + 2 * count, dtype=records.SOLUTION_DTYPE)
+        rows = np.zeros(count, dtype=records.EPOCH_DTYPE)
+        covariances = np.zeros((count, states * (states + 1) // 2))
+        innovations = np.zeros(8 * ready + 8, dtype=records.INNOVATION_DTYPE)
+        events = np.zeros(4 * (ready + count) + _EVENT_ROOM, dtype=records.EVENT_DTYPE)
+        counts = np.zeros(5, dtype=np.int64)
+        geometry = np.zeros(count, dtype=SINGLE_ROW_DTYPE)
+        residuals = np.zeros(2 * SLOTS * end, dtype=RESIDUAL_DTYPE)
+        ambiguities = np.zeros(SLOTS * end, dtype=rtk_records.AMBIGUITY_ROW_DTYPE)
+        resolutions = np.zeros(count, dtype=rtk_records.RESOLUTION_ROW_DTYPE)
+        notes = np.zeros(count * (4 + SLOTS * rtk_records.PAIRS), dtype=NOTE_DTYPE)
+        tally = np.zeros(6, dtype=np.int64)
+        work = state.recorder.lend(np.zeros(1, dtype=records.work_dtype(_STATES)))
+        out = (
+            solutions, rows, covariances, innovations, events, counts, nodes,
+            geometry, residuals, ambiguities, resolutions, notes, tally,
+        )  # fmt: skip
+        taken = tight_rtk.run_tight_rtk(
+            state.filter, state.kernel, state.config, state.tight_config, state.rtk_config,
+            work, np.zeros(1, dtype=SOLVE_DTYPE),
+            state.held_t[:ready], state.held_log_t[:ready], state.held_w[:ready],
+            state.held_f[:ready], epochs, state.rows, state.base_epochs, state.base_rows, partner,
+            out,
+        )  # fmt: skip
+        state.recorder.take_back(work)
+        return taken, out
 
 
 def _dump_types() -> dict[str, np.dtype[Any]]:

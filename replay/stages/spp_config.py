@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from replay.configuration import Section, quantity
 from replay.kernels import weighting
 from replay.stages.gnss_config import GnssConfig
+from replay.stages.smoothing_config import Smoothing
 
 Weighting = Literal["equal", "sine", "threshold", "double-angle", "strength", "sum"]
 WEIGHTINGS: Final = {
@@ -80,3 +81,4 @@ class KfsppConfig(SppConfig, frozen=True):
 
     name: str = "kfspp"
     kfspp: Kfspp = Kfspp()
+    smoothing: Smoothing = Smoothing()

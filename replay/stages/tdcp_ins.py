@@ -41,11 +41,17 @@ class TdcpInertialState(LooseState):
 
 
 class TdcpInertial(GnssInsLoose):
-    """The stage `tdcp-ins`."""
+    """The stage `tdcp-ins`.
+
+    Parameters
+    ----------
+    record : bool
+        Whether it writes transitions for a smoother.
+    """
 
     spec = StageSpec(
         name="tdcp-ins",
-        version=1,
+        version=2,
         inputs=(
             Port(channels.IMU),
             Port(channels.DISPLACEMENT),

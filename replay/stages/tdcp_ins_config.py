@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from replay.configuration import Section, quantity
 from replay.stages.loose_config import Alignment, Filter, Imu, NonHolonomic, Output, Stops
+from replay.stages.smoothing_config import Smoothing
 from replay.stages.tdcp_config import TdcpConfig
 
 
@@ -46,3 +47,4 @@ class TdcpInsConfig(TdcpConfig, frozen=True):
     non_holonomic: NonHolonomic = NonHolonomic()
     imu: Imu = Imu()
     output: Output = Output()
+    smoothing: Smoothing = Smoothing()

@@ -13,6 +13,7 @@ from replay.stages.loose_config import (
     Output,
     Stops,
 )
+from replay.stages.smoothing_config import Smoothing
 from replay.stages.spp_config import Spp, SppConfig
 
 
@@ -51,3 +52,4 @@ class TightConfig(SppConfig, frozen=True):
     non_holonomic: NonHolonomic = NonHolonomic()
     imu: Imu = Imu()
     output: Output = Output()
+    smoothing: Smoothing = Smoothing()

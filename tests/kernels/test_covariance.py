@@ -52,7 +52,9 @@ def test_sparse_propagation_is_the_dense_one(n):
     decay = np.concatenate([np.ones(9), rng.uniform(0.9, 1.0, n - 9)])
     noise = rng.uniform(0, 1e-3, n)
     P = P0.copy()
-    covariance.propagate(P, n, n >= 21, r, C, f_e, f_b, w_b, dt, decay, noise, np.zeros((26, 26)))
+    covariance.propagate(
+        P, n, n >= 21, r, C, f_e, f_b, w_b, dt, decay, noise, n, np.zeros((26, 26))
+    )
     phi = transition(n, r, C, f_e, f_b, w_b, dt, decay)
     Q = np.diag(noise)
     for block in (slice(3, 6), slice(6, 9)):

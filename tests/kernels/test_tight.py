@@ -10,6 +10,7 @@ from replay.kernels.gnss_records import EPOCH_DTYPE, FIRST, MEASURED_DTYPE, SATE
 from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.single_point import RESIDUAL_DTYPE
 from replay.kernels.tight_records import CHANGE, CLOCK, CLONE, DRIFT, TIGHT_STATES
+from replay.kernels.transition import trail_dtype
 from replay.stages.gnss_ins_tc import tight_record
 from replay.stages.tight_config import TightConfig
 from tests.kernels.test_measurements import config
@@ -82,6 +83,11 @@ def filter_state():
     g["clone_t"] = s["t"] - SECOND
     g["epoch_t"] = 4 * SECOND
     return s, g
+
+
+def no_trail():
+    """The trail of a filter that does not record."""
+    return np.zeros(1, dtype=trail_dtype(TIGHT_STATES))[0]
 
 
 def workspace(s):
@@ -399,7 +405,7 @@ def test_the_cloned_place_has_the_antennas_covariance():
     before = s["P"][:COUNT, :COUNT].copy()
     rows = satellites(s)
     x = antenna_of(s)[0]
-    tight_update.remember(s, g, config(), settings(), EPOCH[0], rows, x)
+    tight_update.remember(s, g, config(), settings(), workspace(s), EPOCH[0], rows, x)
     G = np.eye(COUNT)
     place = slice(INERTIAL + CLONE, INERTIAL + CLONE + 3)
     G[place] = sensitivities(lambda state: antenna_of(state)[0])
@@ -421,7 +427,7 @@ def test_clocks_are_carried_by_their_drift(dt):
     tcfg = settings(clock_noise=0.3, drift_noise=0.07)
     before, aux = s["P"][:COUNT, :COUNT].copy(), s["aux"].copy()
     s["t"] += round(dt * 1e9)
-    tight.carry_clocks(s, g, config(), tcfg)
+    tight.carry_clocks(s, g, config(), tcfg, no_trail())
     first = INERTIAL + CLOCK
     clocks = np.arange(first, first + SYSTEMS)
     drift = INERTIAL + DRIFT
@@ -440,7 +446,7 @@ def test_clocks_are_carried_by_their_drift(dt):
     np.testing.assert_allclose(s["aux"], aux, rtol=1e-14)
     assert g["clock_t"] == s["t"]
     # And not twice.
-    tight.carry_clocks(s, g, config(), tcfg)
+    tight.carry_clocks(s, g, config(), tcfg, no_trail())
     assert np.array_equal(s["P"][:COUNT, :COUNT], after)
 
 
@@ -455,7 +461,7 @@ def test_a_clock_that_was_set_is_found(shift, late, told):
     aux = s["aux"].copy()
     x = antenna_of(s)[0]
     found = tight_update.meet_clocks(
-        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES)
+        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES), no_trail()
     )
     assert found == pytest.approx(told, abs=1e-3)
     np.testing.assert_allclose(s["aux"][:SYSTEMS], aux[:SYSTEMS] + told, atol=1e-3)
@@ -480,7 +486,7 @@ def test_a_clock_that_drifted_is_no_set_clock(sigma, told):
     rows["code"][:, 0] = ranges(s, rows) + corrections(rows) + 10.0
     x = antenna_of(s)[0]
     found = tight_update.meet_clocks(
-        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES)
+        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES), no_trail()
     )
     assert found == pytest.approx(told, abs=1e-3)
 
@@ -494,7 +500,7 @@ def test_late_ranges_are_no_set_clock():
     before = s.tobytes()
     x = antenna_of(s)[0]
     found = tight_update.meet_clocks(
-        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES)
+        s, g, config(), settings(), rows, x, np.zeros(3), np.zeros(SATELLITES), no_trail()
     )
     assert found == 0.0
     assert s.tobytes() == before
