@@ -65,27 +65,17 @@ class Antennas:
             Where the numbers of a pattern do not fit its angles.
         """
         serials = calibrations.ragged("serial").texts()
-        frequencies = calibrations.ragged("frequency").texts()
         names = calibrations.ragged("antenna").texts()
         for k in range(len(calibrations)):
-            at = _frequency(frequencies[k])
-            if serials[k] or at is None:
+            if serials[k]:
                 continue
-            record = np.zeros(1, dtype=PATTERN_DTYPE)
-            record["available"] = calibrations.log_time_ns[k]
+            made = calibration_record(calibrations, k, len(self.values))
+            if made is None:
+                continue
+            record, numbers = made
             record["antenna"] = self._number(names[k])
-            record["system"], record["band"], record["frequency"] = at
-            record["offset"] = calibrations["offset_neu_m"][k]
-            for name, field in _FIELDS.items():
-                record[name] = calibrations[field][k]
-            pattern = calibrations.ragged("pattern_m").row(k)
-            by_azimuth = calibrations.ragged("azimuth_pattern_m").row(k)
-            record["zenith_count"] = len(pattern)
-            record["azimuth_count"] = len(by_azimuth) // max(len(pattern), 1)
-            record["first"] = len(self.values)
-            _check(record[0], len(by_azimuth), f"{names[k]}, {frequencies[k]}")
             self.patterns = np.concatenate([self.patterns, record])
-            self.values = np.concatenate([self.values, pattern, by_azimuth])
+            self.values = np.concatenate([self.values, numbers])
 
     def wear(self, info: Columns) -> None:
         """Keep what rows of `replay.ReceiverInfo` say of the antenna."""
@@ -129,6 +119,53 @@ ANTENNA_TYPES: Final[dict[str, np.dtype[Any]]] = {
     "antenna_worn": WORN_DTYPE,
 }
 """Of :meth:`Antennas.arrays`, for dumps."""
+
+
+def calibration_record(
+    calibrations: Columns, k: int, first: int
+) -> tuple[Array, npt.NDArray[np.float64]] | None:
+    """Row of `replay.AntennaCalibration` as a record without an antenna, and its numbers.
+
+    Parameters
+    ----------
+    calibrations : Columns
+    k : int
+        The row.
+    first : int
+        Place of its numbers among those of all.
+
+    Returns
+    -------
+    tuple of array (1,) of PATTERN_DTYPE and float64 array (m), or None
+        None for a frequency that is not known.
+
+    Raises
+    ------
+    DataError
+        Where the numbers of a pattern do not fit its angles.
+    """
+    frequency = _text(calibrations, "frequency", k)
+    at = _frequency(frequency)
+    if at is None:
+        return None
+    record = np.zeros(1, dtype=PATTERN_DTYPE)
+    record["available"] = calibrations.log_time_ns[k]
+    record["system"], record["band"], record["frequency"] = at
+    record["offset"] = calibrations["offset_neu_m"][k]
+    for name, field in _FIELDS.items():
+        record[name] = calibrations[field][k]
+    pattern = calibrations.ragged("pattern_m").row(k)
+    by_azimuth = calibrations.ragged("azimuth_pattern_m").row(k)
+    record["zenith_count"] = len(pattern)
+    record["azimuth_count"] = len(by_azimuth) // max(len(pattern), 1)
+    record["first"] = first
+    antenna = _text(calibrations, "antenna", k)
+    _check(record[0], len(by_azimuth), f"{antenna}, {frequency}")
+    return record, np.concatenate([pattern, by_azimuth]).astype(np.float64)
+
+
+def _text(calibrations: Columns, field: str, k: int) -> str:
+    return calibrations.ragged(field).row(k).tobytes().decode()
 
 
 def _frequency(text: str) -> tuple[int, int, float] | None:

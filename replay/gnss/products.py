@@ -8,6 +8,7 @@ clock broke, `gap` of the row after is 1 and nothing is interpolated across.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -97,6 +98,11 @@ def interpolation_record(
 
 def orbit_series(columns: Columns) -> Series:
     """Rows of `replay.PreciseOrbit` as records; a row without a position makes a gap."""
+    return grouped(*orbit_rows(columns))
+
+
+def orbit_rows(columns: Columns) -> tuple[Array, Int64, tuple[str, ...]]:
+    """Rows of `replay.PreciseOrbit` as records, their satellites' numbers, unknown names."""
     number, unknown = satellite_numbers(columns["satellite"])
     there = columns.is_present("position_ecef_m") & (number >= 0)
     std = columns["position_std_ecef_m"].astype(np.float64)
@@ -106,7 +112,7 @@ def orbit_series(columns: Columns) -> Series:
     rows["position"] = columns["position_ecef_m"]
     rows["std"] = np.where(columns.is_present("position_std_ecef_m"), np.sqrt(square / 3.0), np.nan)
     rows["gap"] = columns["manoeuvre"]
-    return _grouped(rows[there], number[there], unknown)
+    return rows[there], number[there], unknown
 
 
 def clock_series(clocks: Columns | None, orbits: Columns | None = None) -> Series:
@@ -119,35 +125,52 @@ def clock_series(clocks: Columns | None, orbits: Columns | None = None) -> Serie
     orbits : Columns, optional
         Of `replay.PreciseOrbit`; its clocks serve for satellites that `clocks` lacks.
     """
-    parts: list[Array] = []
-    numbers: list[Int64] = []
-    unknown: dict[str, None] = {}
+    parts = [clock_rows(columns) for columns in (clocks, orbits) if columns is not None]
+    unknown = dict.fromkeys(name for _, _, names in parts for name in names)
+    rows, number = join_clocks([(rows, number) for rows, number, _ in parts])
+    return grouped(rows, number, tuple(unknown))
+
+
+def clock_rows(columns: Columns) -> tuple[Array, Int64, tuple[str, ...]]:
+    """Rows of `replay.PreciseClock` or `replay.PreciseOrbit` that have a satellite's clock.
+
+    Returns
+    -------
+    tuple of array (n,) of PRECISE_CLOCK_DTYPE, int64 array (n,), tuple of str
+        Records, their satellites' numbers, unknown names.
+    """
+    number, unknown = satellite_numbers(columns["satellite"])
+    use = (number >= 0) & columns.is_present("satellite") & columns.is_present("clock_s")
+    rows = np.zeros(len(columns), dtype=PRECISE_CLOCK_DTYPE)
+    rows["t"] = columns.valid_time_ns
+    rows["clock"] = columns["clock_s"]
+    stated = columns.is_present("clock_std_s")
+    rows["std"] = np.where(stated, columns["clock_std_s"].astype(np.float64), np.nan)
+    if "clock_event" in columns.values:
+        rows["gap"] = columns["clock_event"]
+    return rows[use], number[use], unknown
+
+
+def join_clocks(parts: Sequence[tuple[Array, Int64]]) -> tuple[Array, Int64]:
+    """Clocks of the first of several products that has the satellite, with their numbers."""
+    rows = [np.zeros(0, dtype=PRECISE_CLOCK_DTYPE)]
+    numbers = [np.zeros(0, dtype=np.int64)]
     known = np.zeros(SATELLITES, dtype=np.bool_)
-    for columns in (clocks, orbits):
-        if columns is None:
-            continue
-        number, foreign = satellite_numbers(columns["satellite"])
-        unknown |= dict.fromkeys(foreign)
-        use = (number >= 0) & columns.is_present("satellite") & columns.is_present("clock_s")
-        use &= ~known[np.maximum(number, 0)]
-        part = np.zeros(len(columns), dtype=PRECISE_CLOCK_DTYPE)
-        part["t"] = columns.valid_time_ns
-        part["clock"] = columns["clock_s"]
-        stated = columns.is_present("clock_std_s")
-        part["std"] = np.where(stated, columns["clock_std_s"].astype(np.float64), np.nan)
-        if "clock_event" in columns.values:
-            part["gap"] = columns["clock_event"]
-        parts.append(part[use])
+    for part, number in parts:
+        use = ~known[number]
+        rows.append(part[use])
         numbers.append(number[use])
-        known[number[use]] = True
-    if not parts:
-        empty = np.zeros(0, dtype=PRECISE_CLOCK_DTYPE)
-        return _grouped(empty, np.zeros(0, dtype=np.int64), ())
-    return _grouped(np.concatenate(parts), np.concatenate(numbers), tuple(unknown))
+        known[number] = True
+    return np.concatenate(rows), np.concatenate(numbers)
 
 
 def bias_series(columns: Columns) -> Series:
     """Rows of `replay.SignalBias` of satellites as records of BIAS_DTYPE."""
+    return grouped_biases(*bias_rows(columns))
+
+
+def bias_rows(columns: Columns) -> tuple[Array, Int64, tuple[str, ...]]:
+    """Rows of `replay.SignalBias` of satellites as records, their numbers, unknown names."""
     number, unknown = satellite_numbers(columns["satellite"])
     rows = np.zeros(len(columns), dtype=BIAS_DTYPE)
     rows["t"] = columns["valid_from_ns"]
@@ -158,7 +181,11 @@ def bias_series(columns: Columns) -> Series:
     stated = columns.is_present("value_std_s")
     rows["std"] = np.where(stated, columns["value_std_s"].astype(np.float64), np.nan)
     there = (number >= 0) & columns.is_present("satellite")
-    rows, number = rows[there], number[there]
+    return rows[there], number[there], unknown
+
+
+def grouped_biases(rows: Array, number: Int64, unknown: tuple[str, ...] = ()) -> Series:
+    """Rows of biases by satellite and the beginning of their time."""
     order = np.lexsort((rows["t"], number))
     starts = np.searchsorted(number[order], np.arange(SATELLITES + 1)).astype(np.int64)
     return Series(rows[order], starts, unknown)
@@ -194,7 +221,17 @@ def satellite_numbers(names: Array) -> tuple[Int64, tuple[str, ...]]:
     return number, tuple(name.decode() for name in unknown)
 
 
-def _grouped(rows: Array, number: Int64, unknown: tuple[str, ...]) -> Series:
+def grouped(rows: Array, number: Int64, unknown: tuple[str, ...] = ()) -> Series:
+    """Rows of orbits or clocks by satellite and time, with their gaps.
+
+    Parameters
+    ----------
+    rows : array (n,) of PRECISE_ORBIT_DTYPE or PRECISE_CLOCK_DTYPE
+        In any order; `gap` is 1 where the product itself says so.
+    number : int64 array (n,)
+        Dense numbers of their satellites.
+    unknown : tuple of str
+    """
     order = np.lexsort((rows["t"], number))
     rows, number = rows[order], number[order]
     starts = np.searchsorted(number, np.arange(SATELLITES + 1)).astype(np.int64)
@@ -223,8 +260,17 @@ def long_steps(times_ns: Int64) -> Bool:
 
 def ionosphere_maps(columns: Columns) -> IonosphereMaps:
     """Rows of `replay.IonosphereMap` as records, in the order of time and height."""
-    order = np.lexsort((columns["height_m"], columns.valid_time_ns)).astype(np.int64)
-    columns = columns.take(order)
+    return join_maps(map_rows(columns))
+
+
+def map_rows(columns: Columns) -> IonosphereMaps:
+    """Rows of `replay.IonosphereMap` as records in their own order; no gap is known.
+
+    Raises
+    ------
+    DataError
+        Where a map has not as many values as its grid.
+    """
     maps = np.zeros(len(columns), dtype=MAP_DTYPE)
     tec, rms = columns.ragged("tec_tecu"), columns.ragged("rms_tecu")
     values = np.ascontiguousarray(tec.values, dtype=np.float64)
@@ -248,6 +294,20 @@ def ionosphere_maps(columns: Columns) -> IonosphereMaps:
         part = rms.row(row)
         if len(part) == len(tec.row(row)):
             deviations[tec.offsets[row] : tec.offsets[row + 1]] = part
-    epochs, place = np.unique(maps["t"], return_inverse=True)
-    maps["gap"] = np.concatenate([[False], long_steps(epochs)])[place]
     return IonosphereMaps(maps, values, deviations)
+
+
+def join_maps(*parts: IonosphereMaps) -> IonosphereMaps:
+    """Maps of several parts in the order of time and height, with their gaps."""
+    maps = np.concatenate([part.maps for part in parts])
+    lengths = np.array([len(part.maps) for part in parts])
+    before = np.cumsum([0, *(len(part.tec) for part in parts[:-1])])
+    maps["first"] += np.repeat(before, lengths)
+    maps = maps[np.lexsort((maps["height"], maps["t"]))]
+    epochs, place = np.unique(maps["t"], return_inverse=True)
+    maps["gap"] = np.concatenate([[False], long_steps(epochs)])[place] if len(epochs) else 0
+    return IonosphereMaps(
+        maps,
+        np.concatenate([part.tec for part in parts]),
+        np.concatenate([part.rms for part in parts]),
+    )

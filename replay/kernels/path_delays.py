@@ -7,6 +7,7 @@ from numba import njit
 from replay.kernels.atmosphere import (
     BEIDOU_REFERENCE_HZ,
     KLOBUCHAR_REFERENCE_HZ,
+    day_of_year,
     klobuchar_b1i,
     klobuchar_l1,
     niell_hydrostatic,
@@ -16,9 +17,13 @@ from replay.kernels.atmosphere import (
 )
 from replay.kernels.elementary import log, sin, sqrt
 from replay.kernels.gnss_records import BEIDOU, SLOTS
-from replay.kernels.meteorology import gpt_zenith, mops_zenith
+from replay.kernels.mapping import gmf, gmf_coefficients, modified_julian_date
+from replay.kernels.meteorology import gpt, gpt_zenith, mops_zenith
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.types import Array, Record
+
+PLACE: Final = 10
+"""Numbers that :func:`prepare_place` keeps of an epoch."""
 
 _EARTH_MU_M3_S2: Final = 3.986004418e14
 _DAY_S: Final = 86400
@@ -45,11 +50,33 @@ def zenith_delays(cfg: Record, place: Array, t: int) -> tuple[float, float]:
 
 
 @njit(cache=True)
+def prepare_place(cfg: Record, place: Array, t: int) -> None:
+    """What the delays of an epoch have in common.
+
+    Parameters
+    ----------
+    cfg : record of SIGHTS_CONFIG_DTYPE
+    place : float64 array (PLACE,)
+        Latitude, longitude (rad) and height (m) are given; filled are the day of the year,
+        zenith hydrostatic and wet delay (m; NaN where the height is that of no antenna), and
+        with GMF its three coefficients and the height above the geoid (m).
+    t : int, ns
+    """
+    place[3] = day_of_year(t)
+    place[4], place[5] = zenith_delays(cfg, place, t)
+    if cfg["troposphere"] == 3:
+        day = modified_julian_date(t)
+        place[6], place[7], place[8] = gmf_coefficients(place[0], place[1], day)
+        # Of GPT the undulation of the geoid alone, which does not change with the day.
+        _, _, undulation = gpt(place[0], place[1], place[2], day)
+        place[9] = place[2] - undulation
+
+
+@njit(cache=True)
 def model_atmosphere(row: Record, x: Array, t: int, s: Record, cfg: Record, place: Array) -> None:
     """Ionosphere, troposphere and relativity of the path.
 
-    `place` (6,): latitude, longitude (rad), height (m), day of year, zenith hydrostatic and
-    wet delay (m; NaN where the height is that of no antenna).
+    `place` (PLACE,) is that of :func:`prepare_place`.
     """
     elevation = row["elevation"]
     if elevation < _LOWEST_RAD:
@@ -76,6 +103,8 @@ def model_atmosphere(row: Record, x: Array, t: int, s: Record, cfg: Record, plac
         if cfg["troposphere"] == 1:
             dry_map = niell_hydrostatic(elevation, latitude, height, place[3])
             wet_map = niell_wet(elevation, latitude)
+        elif cfg["troposphere"] == 3:
+            dry_map, wet_map = gmf(elevation, place[9], place[6], place[7], place[8])
         else:
             dry_map = 1.0 / sin(elevation)
             wet_map = dry_map

@@ -49,7 +49,7 @@ def _added(pattern: Record, values: Array, axes: Array, ux: float, uy: float, uz
 
 
 @njit(cache=True)
-def _directions(sights: Array, positions: Array, out: Array) -> None:
+def sight_directions(sights: Array, positions: Array, out: Array) -> None:
     """Unit vectors (e, 3) to the satellite in ECEF, where it is seen."""
     enu = np.empty((3, 3))
     for k in range(sights.shape[0]):
@@ -95,7 +95,7 @@ def antenna_terms(
     """
     count = sights.shape[0]
     directions = np.empty((count, 3))
-    _directions(sights, positions, directions)
+    sight_directions(sights, positions, directions)
     h = _HALF_STEP_S
     d = np.empty(3)
     for k in range(count):

@@ -17,19 +17,16 @@ from replay.errors import ConfigurationError
 from replay.gnss.antennas import ANTENNA_TYPES, Antennas
 from replay.gnss.ephemerides import ephemeris_records
 from replay.gnss.measurements import (
-    SATELLITE_NAMES,
     Epochs,
     Selection,
     gather_epochs,
     select_signals,
-    signal_names,
 )
 from replay.kernels import antenna_pattern, sights
 from replay.kernels.earth import enu_axes
 from replay.kernels.ephemeris import EPHEMERIS_DTYPE
 from replay.kernels.gnss_records import COUNT, FIRST, SATELLITES, SLOTS, SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
-from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.log.columns import Columns
 from replay.schemas import navigation_pb2
 from replay.stages.base import (
@@ -45,11 +42,12 @@ from replay.stages.base import (
 )
 from replay.stages.gnss_columns import EVENT_TEXT, event_columns
 from replay.stages.gnss_config import GnssConfig
+from replay.stages.sight_columns import coarse_columns, correction_columns, sight_columns
 
 Array = np.ndarray[Any, Any]
 
 _IONOSPHERES: Final = ("none", "klobuchar", "system")
-_TROPOSPHERES: Final = ("none", "niell", "cosecant")
+_TROPOSPHERES: Final = ("none", "niell", "cosecant", "gmf")
 _METEOROLOGIES: Final = ("standard", "mops", "gpt")
 _MODELS: Final = {
     ("G", int(navigation_pb2.IONOSPHERE_MODEL_KLOBUCHAR)): 0,
@@ -117,14 +115,14 @@ class Satellites:
         """State before the first row."""
         if not isinstance(config, GnssConfig):
             raise TypeError("satellites takes a GnssConfig")
-        record = _config_record(config)
+        record = config_record(config)
         if self.role != RECEIVER:
             record["fixed"] = 1
             record["position"] = station_position(config, context, self.role)
         return SatellitesState(
             selection=select_signals(config.gnss.signals, config.gnss.systems),
             config=record,
-            kernel=sights.new_sights_state(*_klobuchar(config)),
+            kernel=sights.new_sights_state(*klobuchar(config)),
             scratch=np.zeros(1, dtype=SOLVE_DTYPE),
             models=np.zeros(0, dtype=sights.IONOSPHERE_DTYPE),
             messages=np.zeros(0, dtype=EPHEMERIS_DTYPE),
@@ -141,7 +139,7 @@ class Satellites:
         if observations is None:
             return state, {}
         found = gather_epochs(observations, state.selection)
-        messages, available, starts = _by_satellite(state.messages, state.available)
+        messages, available, starts = by_satellite(state.messages, state.available)
         notes = np.zeros(SATELLITES + _NOTES_PER_EPOCH * len(found.epochs), dtype=sights.NOTE_DTYPE)
         counts = np.zeros(2, dtype=np.int64)
         taken = sights.run_sights(
@@ -151,9 +149,11 @@ class Satellites:
         state.models = state.models[taken:]
         outputs: Outputs = {}
         columns = {
-            channels.SATELLITES: _sight_columns(found),
-            channels.CORRECTIONS: _correction_columns(found, _antenna_m(state, found)),
-            channels.COARSE: _coarse_columns(found.epochs),
+            channels.SATELLITES: sight_columns(found),
+            channels.CORRECTIONS: correction_columns(
+                found, {"antenna_m": _antenna_m(state, found)}
+            ),
+            channels.COARSE: coarse_columns(found.epochs),
             channels.GNSS_EVENTS: event_columns(notes[: counts[0]], EVENT_TEXT),
         }
         for channel, rows in columns.items():
@@ -206,7 +206,7 @@ class Satellites:
             state.available = np.concatenate([state.available, nav.log_time_ns])
         models = block.get(channels.NAV_IONOSPHERE.name)
         if models is not None:
-            state.models = np.concatenate([state.models, _ionosphere_records(models)])
+            state.models = np.concatenate([state.models, ionosphere_records(models)])
         calibrations = block.get(channels.ANTENNAS.name)
         if calibrations is not None:
             state.antennas.learn(calibrations)
@@ -227,7 +227,7 @@ def _antenna_m(state: SatellitesState, found: Epochs) -> Array:
     return added
 
 
-def _ionosphere_records(models: Columns) -> Array:
+def ionosphere_records(models: Columns) -> Array:
     """Klobuchar's and BeiDou's coefficients; a set that is not eight numbers is left out."""
     coefficients = models.ragged("coefficients")
     systems = models.ragged("system").texts()
@@ -279,7 +279,7 @@ def station_position(config: GnssConfig, context: Context, role: str) -> tuple[f
     )
 
 
-def _klobuchar(config: GnssConfig) -> tuple[Array, Array]:
+def klobuchar(config: GnssConfig) -> tuple[Array, Array]:
     """Coefficients for a log that brings none."""
     for name in ("alpha", "beta"):
         if len(getattr(config.atmosphere, name)) != 4:
@@ -287,12 +287,19 @@ def _klobuchar(config: GnssConfig) -> tuple[Array, Array]:
     return np.array(config.atmosphere.alpha), np.array(config.atmosphere.beta)
 
 
-def _config_record(config: GnssConfig) -> Array:
+def config_record(config: GnssConfig) -> Array:
+    """Settings as the record that the compiled loop reads."""
     orbits, atmosphere = config.orbits, config.atmosphere
     record = np.zeros(1, dtype=sights.SIGHTS_CONFIG_DTYPE)
     if len(orbits.max_age) not in (1, len(SYSTEM_LETTERS)):
         raise ConfigurationError(
             f"orbits.max_age has one number or {len(SYSTEM_LETTERS)}, not {len(orbits.max_age)}"
+        )
+    if atmosphere.ionosphere not in _IONOSPHERES:
+        raise ConfigurationError(
+            "maps of the ionosphere are used by pipelines with precise products alone",
+            where="atmosphere.ionosphere",
+            mend='take "klobuchar" or "system" here, or run a precise pipeline such as ppp',
         )
     record["max_age"] = orbits.max_age
     record["latest"] = int(orbits.choice == "latest")
@@ -307,7 +314,7 @@ def _config_record(config: GnssConfig) -> Array:
     return record
 
 
-def _by_satellite(messages: Array, available: Array) -> tuple[Array, Array, Array]:
+def by_satellite(messages: Array, available: Array) -> tuple[Array, Array, Array]:
     """Messages grouped by satellite, those of one in the order of their arrival."""
     system = np.full(128, -1, dtype=np.int64)
     for place, letter in enumerate(SYSTEM_LETTERS):
@@ -318,73 +325,3 @@ def _by_satellite(messages: Array, available: Array) -> tuple[Array, Array, Arra
     order = np.argsort(number, kind="stable")
     starts = np.searchsorted(number[order], np.arange(SATELLITES + 1)).astype(np.int64)
     return messages[order], available[order], starts
-
-
-def _sight_columns(found: Epochs) -> Columns:
-    epoch = np.repeat(np.arange(len(found.epochs)), found.epochs["count"])
-    seen = found.rows["seen"] == 1
-    rows, at = found.rows[seen], found.epochs[epoch[seen]]
-    return Columns.build(
-        at["t"],
-        {
-            "satellite": SATELLITE_NAMES[rows["satellite"]],
-            "position_ecef_m": np.ascontiguousarray(rows["position"]),
-            "velocity_ecef_m_s": np.ascontiguousarray(rows["velocity"]),
-            "clock_s": rows["clock"] / SPEED_OF_LIGHT_M_S,
-            "clock_drift_s_s": rows["drift"] / SPEED_OF_LIGHT_M_S,
-            "elevation_rad": np.ascontiguousarray(rows["elevation"]),
-            "azimuth_rad": np.ascontiguousarray(rows["azimuth"]),
-            "range_std_m": np.ascontiguousarray(rows["range_std"]),
-            "ephemeris_age_s": np.ascontiguousarray(rows["age"]),
-            "issue": rows["issue"].astype(np.int32),
-            "health": rows["health"].astype(np.int32),
-        },
-        log_time_ns=at["log_t"],
-    )
-
-
-def _coarse_columns(epochs: Array) -> Columns:
-    rows = epochs[epochs["placed"] == 1]
-    return Columns.build(
-        rows["t"],
-        {
-            "position_ecef_m": np.ascontiguousarray(rows["x"]),
-            "clock_offset_m": np.ascontiguousarray(rows["clock"]),
-            "age_s": np.ascontiguousarray(rows["age"]),
-            "satellite_count": rows["used"].astype(np.uint32),
-        },
-        log_time_ns=rows["log_t"],
-    )
-
-
-def _correction_columns(found: Epochs, antenna: Array) -> Columns:
-    epoch = np.repeat(np.arange(len(found.epochs)), found.epochs["count"])
-    used = (found.rows["signal"] != 0) & (found.rows["seen"] == 1)[:, None]
-    row, slot = np.nonzero(used)
-    rows, at = found.rows[row], found.epochs[epoch[row]]
-    delay = rows["group_delay"][np.arange(len(rows)), slot] if len(rows) else np.zeros(0)
-    return Columns.build(
-        at["t"],
-        {
-            "satellite": SATELLITE_NAMES[rows["satellite"]],
-            "signal": signal_names(found.rows["signal"][row, slot]),
-            "distance_m": np.ascontiguousarray(rows["distance"]),
-            "sagnac_m": np.ascontiguousarray(rows["sagnac"]),
-            "satellite_clock_m": -rows["polynomial"],
-            "relativity_m": -rows["relativity"],
-            # Where the message does not tell, nothing is modelled.
-            "group_delay_m": np.where(np.isfinite(delay), delay, 0.0),
-            "ionosphere_m": found.rows["ionosphere"][row, slot],
-            "hydrostatic_m": np.ascontiguousarray(rows["hydrostatic"]),
-            "wet_m": np.ascontiguousarray(rows["wet"]),
-            "hydrostatic_mapping": np.ascontiguousarray(rows["hydrostatic_mapping"]),
-            "wet_mapping": np.ascontiguousarray(rows["wet_mapping"]),
-            "shapiro_m": np.ascontiguousarray(rows["shapiro"]),
-            "antenna_m": antenna[row, slot],
-        },
-        log_time_ns=at["log_t"],
-        present={
-            "shapiro_m": np.ascontiguousarray(rows["shapiro"] != 0.0),
-            "antenna_m": np.isfinite(antenna[row, slot]),
-        },
-    )
