@@ -1,0 +1,265 @@
+"""Precise point positioning: one receiver's codes and phases with precise orbits and clocks.
+
+The innovations are what is left of a measurement after the update: `innovation_std` is then
+that of the residual, and `accepted` says whether the measurement was used. The arithmetic
+is in :mod:`replay.kernels.ppp`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import numpy as np
+
+from replay import channels
+from replay.configuration import Section
+from replay.errors import ConfigurationError
+from replay.gnss.measurements import Selection, select_signals
+from replay.kernels import ppp, ppp_output, ppp_records
+from replay.kernels.gnss_records import BEIDOU, FIRST, SLOTS, SYSTEMS
+from replay.kernels.least_squares import SOLVE_DTYPE
+from replay.kernels.rtk_records import AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE
+from replay.kernels.sights import NOTE_DTYPE
+from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.log.columns import Columns
+from replay.stages.base import (
+    Block,
+    Context,
+    Outputs,
+    Port,
+    StageSpec,
+    dump_arrays,
+    restore_arrays,
+)
+from replay.stages.gnss_columns import (
+    antenna_solution_columns,
+    clock_columns,
+    event_columns,
+    geometry_columns,
+    residual_columns,
+)
+from replay.stages.ppp_columns import (
+    PPP_EVENT_TEXT,
+    bias_columns,
+    phase_columns,
+    slant_columns,
+    zenith_columns,
+)
+from replay.stages.ppp_config import PppConfig
+from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
+from replay.stages.spp import excluded_satellites
+from replay.stages.spp_config import WEIGHTINGS
+from replay.stages.waiting import longest_gap, nominal_interval, read_epochs
+
+Array = np.ndarray[Any, Any]
+
+_DYNAMICS: Final = {
+    "static": ppp_records.STATIC,
+    "kinematic": ppp_records.KINEMATIC,
+    "velocity": ppp_records.VELOCITY,
+}
+_IONOSPHERES: Final = {
+    "free": ppp_records.IONOSPHERE_FREE,
+    "constrained": ppp_records.IONOSPHERE_CONSTRAINED,
+    "combination": ppp_records.IONOSPHERE_COMBINATION,
+}
+_MODES: Final = {"continuous": 1, "fix-and-hold": ppp_records.HOLD, "float": ppp_records.FLOAT_ONLY}
+_TESTS: Final = ("ratio", "w-ratio")
+_PARTIALS: Final = ("none", "elevation", "success")
+# BeiDou satellites that stand, or come back after a day: PRN.
+_HIGH: Final = (*range(1, 11), 13, 16, 31, 38, 39, 40, 56, 59, 60, 61, 62)
+
+
+@dataclasses.dataclass(slots=True)
+class PppState:
+    """Everything that crosses from one block to the next."""
+
+    selection: Selection
+    config: Array
+    kernel: Array
+    x: Array
+    P: Array
+
+
+class Ppp:
+    """The stage `ppp`."""
+
+    spec = StageSpec(
+        name="ppp",
+        version=1,
+        inputs=(
+            Port(channels.GNSS_OBS),
+            Port(channels.SATELLITES),
+            Port(channels.CORRECTIONS),
+            Port(channels.COARSE),
+        ),
+        outputs=(
+            Port(channels.FILTER_INNOVATIONS),
+            Port(channels.FILTER_CLOCKS),
+            Port(channels.FILTER_GEOMETRY),
+            Port(channels.FILTER_TROPOSPHERE),
+            Port(channels.FILTER_IONOSPHERE),
+            Port(channels.FILTER_BIASES),
+            Port(channels.FILTER_PHASES),
+            Port(channels.FILTER_AMBIGUITIES),
+            Port(channels.FILTER_RESOLUTION),
+            Port(channels.FILTER_EVENTS),
+            Port(channels.SOLUTION),
+        ),
+        trigger=Port(channels.GNSS_OBS),
+    )
+
+    def start(self, config: Section, context: Context) -> PppState:
+        """State before the first row."""
+        if not isinstance(config, PppConfig):
+            raise TypeError("ppp takes a PppConfig")
+        return PppState(
+            selection=select_signals(config.gnss.signals, config.gnss.systems),
+            config=ppp_config(config, context),
+            kernel=ppp_records.new_ppp_state(),
+            x=np.zeros(ppp_records.ROOM),
+            P=np.zeros((ppp_records.ROOM, ppp_records.ROOM)),
+        )
+
+    def step(self, state: PppState, block: Block) -> tuple[PppState, Outputs]:
+        """Take a block of epochs."""
+        found = read_epochs(block, state.selection)
+        if found is None:
+            return state, {}
+        epochs, rows = len(found.epochs), len(found.rows)
+        solutions = np.zeros(epochs, dtype=SINGLE_ROW_DTYPE)
+        innovations = np.zeros((2 * SLOTS + 2) * rows, dtype=RESIDUAL_DTYPE)
+        ambiguities = np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE)
+        resolutions = np.zeros(epochs, dtype=RESOLUTION_ROW_DTYPE)
+        # Per epoch a jump of the clock, too few satellites or a reset, a fix or its loss;
+        # breaks of ambiguities whose satellite may be out of view.
+        notes = np.zeros((5 + ppp_records.ROOM) * epochs, dtype=NOTE_DTYPE)
+        zeniths = np.zeros(epochs, dtype=ppp_records.ZENITH_ROW_DTYPE)
+        slants = np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE)
+        biases = np.zeros(SYSTEMS * SLOTS * epochs, dtype=ppp_records.BIAS_ROW_DTYPE)
+        phases = np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE)
+        counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
+        ppp.run_ppp(
+            state.kernel, state.x, state.P, state.config, np.zeros(1, dtype=SOLVE_DTYPE),
+            found.epochs, found.rows, solutions, innovations, ambiguities, resolutions, notes,
+            zeniths, slants, biases, phases, counts,
+        )  # fmt: skip
+        solutions = solutions[: counts[ppp_output.SOLUTIONS]]
+        columns: dict[channels.ChannelSpec, Columns] = {
+            channels.FILTER_INNOVATIONS: residual_columns(
+                innovations[: counts[ppp_output.INNOVATIONS]]
+            ),
+            channels.FILTER_CLOCKS: clock_columns(solutions),
+            channels.FILTER_GEOMETRY: geometry_columns(solutions),
+            channels.FILTER_TROPOSPHERE: zenith_columns(zeniths[: counts[ppp_output.ZENITHS]]),
+            channels.FILTER_IONOSPHERE: slant_columns(slants[: counts[ppp_output.SLANTS]]),
+            channels.FILTER_BIASES: bias_columns(biases[: counts[ppp_output.BIASES]]),
+            channels.FILTER_PHASES: phase_columns(phases[: counts[ppp_output.PHASES]]),
+            channels.FILTER_AMBIGUITIES: ambiguity_columns(
+                ambiguities[: counts[ppp_output.AMBIGUITIES]]
+            ),
+            channels.FILTER_RESOLUTION: resolution_columns(
+                resolutions[: counts[ppp_output.RESOLUTIONS]]
+            ),
+            channels.FILTER_EVENTS: event_columns(
+                notes[: counts[ppp_output.NOTES]], PPP_EVENT_TEXT
+            ),
+            channels.SOLUTION: antenna_solution_columns(solutions),
+        }
+        return state, {channel.name: found for channel, found in columns.items() if len(found)}
+
+    def finish(self, state: PppState) -> Outputs:
+        """Nothing is left to say."""
+        return {}
+
+    def dump(self, state: PppState) -> bytes:
+        """The state as bytes."""
+        n = int(state.kernel["n"][0])
+        return dump_arrays({"kernel": state.kernel, "x": state.x[:n], "P": state.P[:n, :n]})
+
+    def restore(self, state: PppState, data: bytes) -> PppState:
+        """The state of a dump."""
+        number = np.dtype(np.float64)
+        arrays: dict[str, Any] = restore_arrays(
+            data, {"kernel": ppp_records.PPP_STATE_DTYPE, "x": number, "P": number}
+        )
+        n = int(arrays["kernel"]["n"][0])
+        x, P = np.zeros_like(state.x), np.zeros_like(state.P)
+        x[:n] = arrays["x"]
+        P[:n, :n] = arrays["P"]
+        return dataclasses.replace(state, kernel=arrays["kernel"], x=x, P=P)
+
+
+def ppp_config(config: PppConfig, context: Context) -> Array:
+    """Settings as the record that the compiled loop reads.
+
+    Raises
+    ------
+    ConfigurationError
+        Where a list has the wrong length or a number cannot be.
+    """
+    own = config.ppp
+    measurements, motion, delays = own.measurements, own.motion, own.delays
+    phases, ambiguities = own.phases, own.ambiguities
+    record = np.zeros(1, dtype=ppp_records.PPP_CONFIG_DTYPE)
+    if not 1 <= measurements.frequencies <= SLOTS:
+        raise ConfigurationError(f"ppp.measurements.frequencies is from 1 to {SLOTS}")
+    if delays.ionosphere == "combination" and measurements.frequencies < 2:
+        raise ConfigurationError(
+            "ppp.delays.ionosphere is a combination of two frequencies, "
+            f"and ppp.measurements.frequencies is {measurements.frequencies}",
+            mend="--set ppp.measurements.frequencies=2",
+        )
+    if delays.ionosphere == "combination" and ambiguities.mode != "float":
+        raise ConfigurationError(
+            "ambiguities of an ionosphere-free combination are no integers",
+            mend="--set ppp.ambiguities.mode=float",
+        )
+    if delays.ionosphere == "constrained" and config.atmosphere.ionosphere == "none":
+        raise ConfigurationError(
+            "ppp.delays.ionosphere is constrained to a model, and there is none",
+            mend="--set atmosphere.ionosphere=klobuchar",
+        )
+    for name, count in (
+        *(("code_sigma", SLOTS), ("phase_sigma", SLOTS)),
+        *(("code_scale", SYSTEMS), ("phase_scale", SYSTEMS)),
+    ):
+        values = getattr(measurements, name)
+        if len(values) not in (1, count):
+            raise ConfigurationError(f"ppp.measurements.{name} has {count} numbers or one")
+        record[name] = values
+    record["mask"] = config.gnss.mask
+    record["cn0_mask"] = config.gnss.cn0_mask
+    record["excluded"] = excluded_satellites(config.gnss)
+    record["slots"] = measurements.frequencies
+    record["weighting"] = WEIGHTINGS[measurements.weighting]
+    record["range_scale"] = measurements.range_std_scale
+    record["range_usual"] = config.products.range_std
+    record["satellite_scale"] = 1.0
+    for prn in _HIGH:
+        record["satellite_scale"][0, FIRST[BEIDOU] + prn - 1] = measurements.high_scale
+    for name in ("doppler_sigma", "code_gate", "phase_gate", "rounds"):
+        record[name] = getattr(measurements, name)
+    for name in motion.__struct_fields__:
+        if name != "dynamics":
+            record[name] = getattr(motion, name)
+    record["dynamics"] = _DYNAMICS[motion.dynamics]
+    for name in delays.__struct_fields__:
+        if name not in ("ionosphere", "gradients"):
+            record[name] = getattr(delays, name)
+    record["ionosphere"] = _IONOSPHERES[delays.ionosphere]
+    record["gradients"] = int(delays.gradients)
+    record["ambiguity_sigma"] = phases.sigma
+    record["ambiguity_noise"] = phases.noise
+    for name in ("geometry_free", "geometry_free_rate", "wide_lane", "rejections", "failures"):
+        record[name] = getattr(phases, name)
+    record["gap"] = longest_gap(phases.gap, nominal_interval(context, Port(channels.GNSS_OBS)))
+    for name in ambiguities.__struct_fields__:
+        if name not in ("mode", "test", "mask", "partial"):
+            record[name] = getattr(ambiguities, name)
+    record["mode"] = _MODES[ambiguities.mode]
+    record["test"] = _TESTS.index(ambiguities.test)
+    record["partial"] = _PARTIALS.index(ambiguities.partial)
+    record["mask_resolve"] = ambiguities.mask
+    return record
