@@ -4,6 +4,7 @@ From the true sights of :mod:`replay.kernels.observables` and prepared random nu
 A carrier phase refers to the clock that the message is for, without group delays and
 with whole cycles only, so that double differences of phases are whole numbers but for
 geometry, atmosphere and noise; group delays and receiver biases are in the code alone.
+Biases of the phase and its wind-up come on top where a scenario wants them.
 """
 
 from typing import Final
@@ -166,6 +167,7 @@ def track(
     losses: Array,
     clock: Array,
     antenna: Array,
+    carrier_alone: Array,
     signal: Array,
     normals: Array,
     uniforms: Array,
@@ -186,6 +188,8 @@ def track(
         Receiver's bias (s) and drift (s/s).
     antenna : float64 array (e, 2)
         What it adds to code and phase (m), and the rate of that (m/s).
+    carrier_alone : float64 array (e, 2)
+        Wind-up and biases, which only the phase has (m), and the rate of that (m/s).
     signal : array (1,) of SIGNAL_DTYPE
     normals : float64 array (e, 6)
         The two of multipath are correlated in time, of unit variance.
@@ -275,6 +279,7 @@ def track(
                 if u[FLAG] < s["flag_probability"]:
                     m["flag"] = 1
         phase = free - delay
+        phase += carrier_alone[k, 0]
         noise = s["carrier_sigma_m"] * noisy * n[CARRIER]
         multipath = s["carrier_multipath_m"] * weight * n[CARRIER_MULTIPATH]
         phase += noise
@@ -286,6 +291,7 @@ def track(
         rate = c * (1.0 - (1.0 + sight["clock_drift"]) * (1.0 - sight["travel_rate"]) * pace)
         rate += pace * (sight["neutral_rate"] - s["ionosphere"] * sight["ionosphere_rate"])
         rate += pace * antenna[k, 1]
+        rate += pace * carrier_alone[k, 1]
         rate += s["rate_sigma_m_s"] * noisy * n[RATE]
         m["carrier"] = 1
         m["carrier_cycles"] = phase / s["wavelength_m"] + ambiguity

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, state_at_reception
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, satellite_state, state_at_reception
 from replay.kernels.sight import line_of_sight
 from replay.kernels.types import Array
 
@@ -107,6 +107,36 @@ def true_state(
     state[7] += share * (other[7] - state[7]) + rate * difference
     distance, _, _, _ = line_of_sight(x, y, z, state[0], state[1], state[2])
     return distance / SPEED_OF_LIGHT_M_S
+
+
+@njit(cache=True)
+def states_at(messages: Array, limit_s: float, times_ns: Array, out: Array) -> None:
+    """Satellite at system times, ECEF at the same time.
+
+    Parameters
+    ----------
+    messages, limit_s
+        As in :func:`between_messages`.
+    times_ns : int64 array (n,), ns, GPS
+    out : float64 array (n, 8)
+        Rows as :mod:`replay.kernels.orbits` says; NaN where no message is near enough.
+    """
+    other = np.empty(8)
+    for n in range(times_ns.shape[0]):
+        state = out[n]
+        i, share, rate = between_messages(messages, times_ns[n], 0.0, limit_s)
+        if i < 0:
+            state[:] = _NAN
+            continue
+        satellite_state(messages[i], times_ns[n], 0.0, state)
+        if share == 0.0:
+            continue
+        satellite_state(messages[i + 1], times_ns[n], 0.0, other)
+        for j in (0, 1, 2, 6):
+            k = j + 3 if j < 3 else 7
+            difference = other[j] - state[j]
+            state[j] += share * difference
+            state[k] += share * (other[k] - state[k]) + rate * difference
 
 
 @njit(cache=True)

@@ -8,13 +8,15 @@ what follows from the scenario is said; the rest is left to the pipeline.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
+
+import msgspec
 
 from replay.configuration import STANDARD_GRAVITY_M_S2, Table, merge
 from replay.simulate.scenario import tables_toml
-from replay.simulate.settings import Settings
-from replay.simulate.sky import Receiver
+from replay.simulate.settings import Imu, Settings, Unit
+from replay.simulate.sky import Receiver, Setup, Sky
 
 # What is left to a perfect unit: a filter needs some noise, and integration has its own.
 _LEAST_GYRO_NOISE: Final = 1e-7  # rad/sqrt(s)
@@ -39,6 +41,9 @@ _WALKING_SPEED: Final = 1.0  # m/s
 _WALKING_HEADING: Final = 0.15  # rad: steps sway, and the body turns about its course
 _SLIP: Final = 0.02  # m/s
 _HOUR_S: Final = 3600.0
+_LEAST_WET: Final = 0.01  # m: mapping functions differ
+_LEAST_WET_NOISE: Final = 1e-5  # m/sqrt(s)
+_SYSTEMS_ALIKE: Final = (1.0,) * 5
 _BRAKING_M_S: Final = 15.0  # at 1 m/s^2 from this speed the lean shows as so much slip
 
 
@@ -118,21 +123,71 @@ def fitting_defaults(settings: Settings) -> Table:
 
 
 def defaults_toml(
-    settings: Settings, over: Mapping[str, Any] | None = None, receivers: Sequence[Receiver] = ()
+    settings: Settings, over: Mapping[str, Any] | None = None, setup: Setup | None = None
 ) -> str:
     """Canonical TOML of :func:`fitting_defaults`, with tables that go over it.
 
-    Of `receivers` the one that `over` names in its section `gnss`, or the first that rides
-    on the vehicle, tells where the antenna stands.
+    Of the receivers of `setup` the one that `over` names in its section `gnss`, or the first
+    that rides on the vehicle, tells where the antenna stands, and where there are precise
+    products what its signals are worth.
     """
+    receivers = () if setup is None else setup.receivers
     tables = fitting_defaults(settings)
     named = (over or {}).get("gnss", {}).get("receiver", "")
     riding = [receiver for receiver in receivers if receiver.kind == "vehicle"]
     riding.sort(key=lambda receiver: receiver.name != named)
     if riding:
         tables["antenna"] = {"lever_arm": riding[0].lever_arm}
+        if setup is not None and setup.products is not None:
+            tables["ppp"] = {"measurements": _signals(riding[0]), "delays": _delays(setup.sky)}
+            tables["tight"] = {"wind_up": setup.sky.wind_up}
+            # What hangs over the simulated ground is the standard atmosphere, in every season.
+            tables["atmosphere"] = {"meteorology": "standard"}
     merge(tables, over or {})
     return tables_toml(tables)
+
+
+def _signals(receiver: Receiver) -> dict[str, Any]:
+    """What a filter that takes noise for white has to think of a receiver's signals.
+
+    Of errors that last, n epochs tell no more than few: with a correlation of r from one
+    epoch to the next a mean over many has the variance of white noise that is (1 + r) / (1 - r)
+    times as large.
+    """
+    noise, multipath = receiver.noise, receiver.multipath
+    lasting = 1.0
+    if multipath.tau > 0.0:
+        correlation = math.exp(-1.0 / (receiver.rate * multipath.tau))
+        lasting = math.sqrt((1.0 + correlation) / (1.0 - correlation))
+    return {
+        "code_sigma": (_root_sum_square(noise.code, lasting * multipath.code),),
+        "phase_sigma": (_root_sum_square(noise.carrier, lasting * multipath.carrier),),
+        "doppler_sigma": noise.rate,
+        "code_scale": _SYSTEMS_ALIKE,
+        "weighting": "sine",
+    }
+
+
+def _delays(sky: Sky) -> dict[str, Any]:
+    """What is known of the zenith's wet delay, and how fast it wanders."""
+    air = sky.troposphere
+    return {
+        "wet_sigma": max(_root_sum_square(air.wet, air.local_wet), _LEAST_WET),
+        "wet_noise": max(air.wet * math.sqrt(2.0 / air.tau), _LEAST_WET_NOISE),
+    }
+
+
+def unit_toml(settings: Settings, unit: Unit) -> str:
+    """Canonical TOML of what differs where a further inertial unit is chosen."""
+    own = Imu(rate=unit.rate, grade=unit.grade, errors=unit.errors)
+    told = fitting_defaults(msgspec.structs.replace(settings, imu=own))
+    usual = fitting_defaults(settings)
+    return tables_toml(
+        {
+            name: {key: value for key, value in section.items() if value != usual[name][key]}
+            for name, section in told.items()
+        }
+    )
 
 
 def _three(value: float) -> tuple[float, float, float]:

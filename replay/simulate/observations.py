@@ -18,17 +18,20 @@ from replay.kernels import elementary, tracking
 from replay.kernels.atmosphere import KLOBUCHAR_REFERENCE_HZ
 from replay.kernels.noise import gauss_markov
 from replay.kernels.observables import SIGHT_DTYPE, see
-from replay.kernels.orbits import SPEED_OF_LIGHT_M_S, group_delay
+from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.tracking import MEASUREMENT_DTYPE, SIGNAL_DTYPE
 from replay.kernels.true_orbit import broadcast_errors
 from replay.log.columns import Columns, Ragged, concatenate
 from replay.simulate.air import ionosphere_message
 from replay.simulate.antennas import calibration_columns
+from replay.simulate.biases import carrier_bias_cycles, code_bias_s
 from replay.simulate.blockage import Surroundings, surroundings
 from replay.simulate.constellation import name_of, sends
 from replay.simulate.navigation import preferred
 from replay.simulate.noise import Floats, normals, uniforms
 from replay.simulate.phase_centres import PhaseCentres, worn_antennas
+from replay.simulate.physical import WindUp, tide_ranges
+from replay.simulate.products import product_channels
 from replay.simulate.signal_truth import signal_truth
 from replay.simulate.sky import Receiver, Setup
 from replay.simulate.truth import Epochs, Scene, TrueSky, make_epochs, make_sky, wander
@@ -39,12 +42,12 @@ Records = npt.NDArray[np.void]
 Ints = npt.NDArray[np.int64]
 
 _MILLISECOND: Final = 1e-3
-_HIDDEN_DELAY_M: Final = 1.0  # of signals whose delay no message tells; assumed
 _HOUR_S: Final = 3600.0
+_TIDES: Final = ("solid_tide_m", "pole_tide_m")
 
 
 def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, str]]:
-    """Channels of navigation data, antennas and of every receiver, and what was done to them.
+    """Channels of navigation data, products, antennas, receivers, and what was done to them.
 
     Returns
     -------
@@ -62,10 +65,11 @@ def observe(setup: Setup, scene: Scene) -> tuple[dict[str, Columns], dict[str, s
     told = [antenna for antenna in worn_antennas(setup) if antenna.calibrated]
     if told:
         rows[channels.ANTENNAS.topic] = calibration_columns(told, scene.start_ns)
+    rows.update(product_channels(setup, scene, sky))
     slips: list[dict[str, Any]] = []
     arcs: list[list[Any]] = []
     for receiver in setup.receivers:
-        epochs = make_epochs(receiver, scene)
+        epochs = make_epochs(receiver, scene, setup.sky)
         around = [s for s in setup.blockages if _concerns(s.receivers, receiver)]
         part = _Part(setup, scene, sky, receiver, epochs, around)
         measured = part.measure()
@@ -118,6 +122,7 @@ class _Part:
         self.receiver, self.epochs = receiver, epochs
         self.around = around
         self.centres = PhaseCentres(receiver, setup, scene, epochs)
+        self.wind_up = WindUp(receiver, setup, scene, sky, epochs)
         self.slips: list[dict[str, Any]] = []
         self.arcs: list[list[Any]] = []
         self.terms: Columns | None = None  # filled by `measure` where they are asked for
@@ -132,6 +137,11 @@ class _Part:
             * float(normals(scene.seed, f"{receiver.name}.{signal}.bias", 1, 1)[0, 0])
             for signal in receiver.signals
         }
+        self.carrier_biases = {
+            signal: receiver.noise.carrier_bias
+            * float(normals(scene.seed, f"{receiver.name}.{signal}.carrier_bias", 1, 1)[0, 0])
+            for signal in receiver.signals
+        }
 
     def measure(self) -> Columns:
         """Rows of all satellites and signals, sorted by time, satellite, signal."""
@@ -144,24 +154,37 @@ class _Part:
         for index, name in enumerate(sorted(sights)):
             number = next(n for n, r in enumerate(self.sky.broadcast) if name_of(r) == name)
             off = self._orbit_errors(name, sights[name]) if self.scene.signals else None
+            turned = self.wind_up.of(number, sights[name])
+            tides = tide_ranges(self.epochs, sights[name]) if self.scene.signals else ()
             for signal in sorted(self.receiver.signals):
                 if signal[0] == name[0] and sends(self.sky.broadcast[number], signal[1:]):
                     settings = self._settings(number, signal)
                     channel = int(self.sky.broadcast[number]["frequency_channel"])
                     antenna = self.centres.of(signal, channel, sights[name])
+                    wavelength = float(settings["wavelength_m"][0])
+                    bias_m = wavelength * self._carrier_bias(number, signal)
+                    alone = wavelength * turned
+                    alone[:, 0] += bias_m
                     table = self._signal(
-                        name, signal, settings, sights[name], around[name], antenna
+                        name, signal, settings, sights[name], around[name], antenna, alone
                     )
                     rows = np.flatnonzero(table["code"])
                     parts.append(self._columns(number, signal[1:], table, rows))
                     order.append(rows * len(sights) + index)
                     if off is not None:
                         kept = sights[name][rows], table[rows]
+                        extra = {
+                            field: tide[rows] for field, tide in zip(_TIDES, tides, strict=False)
+                        }
+                        if self.wind_up.there:
+                            extra["wind_up_m"] = wavelength * turned[rows, 0]
+                        if self.setup.sky.biases.carrier or self.receiver.noise.carrier_bias:
+                            extra["carrier_delay_m"] = np.full(len(rows), bias_m)
                         terms.append(
                             signal_truth(
                                 (name, signal[1:]), self._times(rows), kept,
                                 self.epochs.clock[rows, 0], off[rows], settings[0],
-                                antenna[rows, 0] if self.centres.there else None,
+                                antenna[rows, 0] if self.centres.there else None, extra,
                             )
                         )  # fmt: skip
         if not parts:
@@ -222,7 +245,7 @@ class _Part:
 
     def _signal(
         self, name: str, signal: str, settings: Records, sights: Records, around: Surroundings,
-        antenna: Floats,
+        antenna: Floats, alone: Floats,
     ) -> Records:  # fmt: skip
         """Measurements of one signal of one satellite at every epoch."""
         receiver, scene, count = self.receiver, self.scene, len(sights)
@@ -241,8 +264,8 @@ class _Part:
         states = np.where(self.awake, around.states, tracking.BLOCKED)
         out = np.zeros(count, dtype=MEASUREMENT_DTYPE)
         tracking.track(
-            sights, states, around.losses, self.epochs.clock, antenna, settings, noise, draws,
-            listed, self.epochs.interval_s, out,
+            sights, states, around.losses, self.epochs.clock, antenna, alone, settings, noise,
+            draws, listed, self.epochs.interval_s, out,
         )  # fmt: skip
         self._remember(name, signal[1:], out)
         return out
@@ -262,17 +285,19 @@ class _Part:
         drive = math.sqrt(-float(elementary.expm1(-2.0 * interval / settings.tau)))
         gauss_markov(1.0, decay, drive, columns)
 
+    def _carrier_bias(self, number: int, signal: str) -> float:
+        """Of satellite and receiver together, cycles."""
+        given, record = self.setup.sky.biases, self.sky.broadcast[number]
+        own = carrier_bias_cycles(record, signal, given, self.scene.seed)
+        return own + self.carrier_biases[signal]
+
     def _settings(self, number: int, signal: str) -> Records:
         """Numbers of one signal for the kernel."""
         r, record = self.receiver, self.sky.broadcast[number]
         band = int(signal[1])
         frequency = frequency_hz(signal[0], band, int(record["frequency_channel"]))
         ratio = KLOBUCHAR_REFERENCE_HZ / frequency
-        told = float(group_delay(record, band))
-        if math.isnan(told):
-            source = f"delay.{name_of(record)}.{band}"
-            hidden = float(normals(self.scene.seed, source, 1, 1)[0, 0])
-            told = _HIDDEN_DELAY_M / SPEED_OF_LIGHT_M_S * hidden
+        told = code_bias_s(record, signal, self.setup.sky.biases, self.scene.seed)
         one = np.zeros(1, dtype=SIGNAL_DTYPE)
         values = {
             "wavelength_m": SPEED_OF_LIGHT_M_S / frequency,
@@ -390,7 +415,7 @@ def _information(receiver: Receiver, epochs: Epochs, scene: Scene) -> Columns:
             "marker": Ragged.from_texts([receiver.name]),
             "receiver": Ragged.from_texts(["simulated"]),
             "antenna": Ragged.from_texts([receiver.antenna]),
-            "approximate_position_ecef_m": epochs.positions[:1].copy(),
+            "approximate_position_ecef_m": epochs.crust[:1].copy(),
             "antenna_offset_enu_m": np.zeros((1, 3)),
             "interval_s": np.array([epochs.interval_s]),
             "header": Ragged.from_blobs([b""]),

@@ -26,6 +26,29 @@ def worn_antennas(setup: Setup) -> list[Antenna]:
     return [antenna for antenna in setup.antennas if antenna.name in names]
 
 
+def mounted(receiver: Receiver, scene: Scene, epochs: Epochs) -> tuple[Floats, Floats]:
+    """How the antenna of a receiver stands at every epoch.
+
+    Returns
+    -------
+    axes : float64 array (e, 3, 3)
+        Rows to the right of its mark, along it, up, in ECEF.
+    turning : float64 array (e, 3), rad/s, ECEF
+        Of those axes against the Earth.
+    """
+    count = len(epochs.elapsed_ns)
+    axes, turning = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    if receiver.kind == "static":
+        if count:
+            x, y, z = epochs.crust[0].tolist()
+            enu_axes(x, y, z, axes[0])
+            axes[1:] = axes[0]
+        return axes, turning
+    true_s = epochs.elapsed_ns / time.NS_PER_S - epochs.clock[:, 0] - receiver.delay
+    mount_on_body(scene.trajectory.poses(np.maximum(true_s, 0.0)), axes, turning)
+    return axes, turning
+
+
 class PhaseCentres:
     """What the antenna of a receiver adds, the same to code and phase.
 
@@ -44,22 +67,13 @@ class PhaseCentres:
     def __init__(self, receiver: Receiver, setup: Setup, scene: Scene, epochs: Epochs) -> None:
         self.there = bool(receiver.antenna)
         self._epochs, self._time_ns = epochs, scene.start_ns
-        count = len(epochs.elapsed_ns)
-        self._axes, self._turning = np.zeros((count, 3, 3)), np.zeros((count, 3))
         # The same records that a run makes of the log's rows.
         self._known = Antennas()
         if not self.there:
             return
         own = [antenna for antenna in setup.antennas if antenna.name == receiver.antenna]
         self._known.learn(calibration_columns(own, scene.start_ns))
-        if receiver.kind == "static":
-            if count:
-                x, y, z = epochs.positions[0].tolist()
-                enu_axes(x, y, z, self._axes[0])
-                self._axes[1:] = self._axes[0]
-            return
-        true_s = epochs.elapsed_ns / time.NS_PER_S - epochs.clock[:, 0] - receiver.delay
-        mount_on_body(scene.trajectory.poses(np.maximum(true_s, 0.0)), self._axes, self._turning)
+        self._axes, self._turning = mounted(receiver, scene, epochs)
 
     def of(self, signal: str, channel: int, sights: Records) -> Floats:
         """Range (m) and its rate (m/s) that are added at every epoch, `(e, 2)`.

@@ -13,8 +13,9 @@ from replay.configuration import Table, build, literal, merge, to_toml
 from replay.errors import ConfigurationError, UsageError
 from replay.simulate import gnss, imu
 from replay.simulate.segments import Segment, read_segments
-from replay.simulate.settings import Gnss, Imu, Settings, check
-from replay.simulate.sky import Setup, take_setup
+from replay.simulate.settings import Gnss, Imu, Settings, Unit, check, check_units
+from replay.simulate.setup_tables import read_many, take_setup
+from replay.simulate.sky import Setup, table_lines
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -25,6 +26,8 @@ class Scenario:
     ----------
     settings : Settings
     segments : tuple of Segment
+    units : tuple of Unit
+        Inertial units beside the first.
     setup : Setup
         Satellites and receivers that observe them.
     defaults : Table
@@ -36,12 +39,15 @@ class Scenario:
     settings: Settings
     segments: tuple[Segment, ...]
     setup: Setup = dataclasses.field(default_factory=Setup)
+    units: tuple[Unit, ...] = ()
     defaults: Table = dataclasses.field(default_factory=dict)
     folder: Path = dataclasses.field(default=Path(), compare=False)
 
     def to_toml(self) -> str:
         """Canonical TOML; reading it gives an equal scenario."""
         parts = [to_toml(self.settings)]
+        for unit in self.units:
+            parts.append("\n".join(table_lines("[[imus]]", "imus", unit)))
         for segment in self.segments:
             keys = (f"{k} = {literal(getattr(segment, k))}" for k in segment.__struct_fields__)
             parts.append("\n".join(("[[segments]]", *keys)) + "\n")
@@ -121,6 +127,7 @@ def read_scenario(table: Mapping[str, Any], folder: Path = Path()) -> Scenario:
     merge(rest, table)
     tables = rest.pop("segments", None)
     setup = take_setup(rest, folder)
+    units = _take_units(rest)
     defaults = rest.pop("defaults", {})
     if not isinstance(defaults, dict):
         raise ConfigurationError("defaults is no table", mend="write [defaults.SECTION]")
@@ -133,7 +140,20 @@ def read_scenario(table: Mapping[str, Any], folder: Path = Path()) -> Scenario:
             "a scenario has segments or trajectory.log, not both", mend="leave one of them out"
         )
     segments = () if settings.trajectory.log else read_segments(tables)
-    return Scenario(settings, segments, setup, defaults, folder)
+    return Scenario(settings, segments, setup, units, defaults, folder)
+
+
+def _take_units(table: Table) -> tuple[Unit, ...]:
+    """Take the further inertial units out of a scenario's table."""
+    given = table.pop("imus", [])
+    wrapped = []
+    for one in given if isinstance(given, list) else []:
+        inner: Table = {"imus": {**one} if isinstance(one, Mapping) else one}
+        _apply_grade(inner, "imus", "navigation", imu.IMU_GRADES)
+        wrapped.append(inner["imus"])
+    units = read_many(Unit, wrapped if isinstance(given, list) else given, "imus")
+    check_units(units)
+    return units
 
 
 def _apply_grade(

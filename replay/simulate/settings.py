@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Final
 
 from replay import time
@@ -63,6 +64,15 @@ class Imu(Section, frozen=True):
 
     rate: Annotated[float, quantity("Hz", "of samples")] = 100.0
     grade: str = "industrial"
+    errors: imu.ImuErrors = imu.ImuErrors()
+
+
+class Unit(Section, frozen=True):
+    """A further inertial unit in the same place, on a channel of its own name."""
+
+    name: str
+    rate: Annotated[float, quantity("Hz", "of samples")] = 100.0
+    grade: str = "navigation"
     errors: imu.ImuErrors = imu.ImuErrors()
 
 
@@ -176,6 +186,32 @@ def check(settings: Settings) -> None:
     _check_recorded(settings)
     imu.check(settings.imu.errors)
     gnss.check(settings.gnss.errors)
+
+
+def check_units(units: Sequence[Unit]) -> None:
+    """Refuse impossible further inertial units.
+
+    Raises
+    ------
+    ConfigurationError
+        That names the unit and how to mend it.
+    """
+    names = [unit.name for unit in units]
+    for index, unit in enumerate(units):
+        where = f"imus[{index}]"
+        if not unit.name or "/" in unit.name:
+            raise ConfigurationError(
+                f"the name is {unit.name!r}", where=where, mend="write one without a slash"
+            )
+        if unit.name in names[:index]:
+            raise ConfigurationError(f"two inertial units are called {unit.name!r}", where=where)
+        if unit.rate < _LOWEST_IMU_RATE_HZ:
+            raise ConfigurationError(
+                f"rate is {unit.rate:g} Hz",
+                where=where,
+                mend=f"write {_LOWEST_IMU_RATE_HZ:g} Hz or more",
+            )
+        imu.check(unit.errors)
 
 
 def _check_recorded(settings: Settings) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +15,8 @@ from replay.simulate.noise import Floats
 Records = npt.NDArray[np.void]
 
 _CARRIER: Final = ("carrier_noise_m", "carrier_multipath_m")
+_TIDES: Final = ("solid_tide_m", "pole_tide_m")
+_PHASE_ONLY: Final = ("wind_up_m", "carrier_delay_m")
 
 
 def signal_truth(
@@ -24,6 +27,7 @@ def signal_truth(
     orbit_error_m: Floats,
     settings: Any,
     antenna_m: Floats | None = None,
+    extra: Mapping[str, Floats] | None = None,
 ) -> Columns:
     """Rows of one signal of one satellite.
 
@@ -42,6 +46,8 @@ def signal_truth(
     settings : record of SIGNAL_DTYPE
     antenna_m : float64 array (n,), m, or None
         What the antenna adds; None for a receiver without one.
+    extra : mapping of field to float64 array (n,), m, optional
+        Further terms. Those of tides are taken off the range, which they are in.
 
     Returns
     -------
@@ -70,4 +76,8 @@ def signal_truth(
         values[name] = np.where(carrier, measured[name], np.nan)
     if antenna_m is not None:
         values["antenna_m"] = antenna_m
+    for name, term in (extra or {}).items():
+        values[name] = np.where(carrier, term, np.nan) if name in _PHASE_ONLY else term
+        if name in _TIDES:
+            values["range_m"] = values["range_m"] - term
     return Columns.build(times[0], values, log_time_ns=times[1])

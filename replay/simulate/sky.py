@@ -1,27 +1,21 @@
 """Settings of satellites, atmosphere, receivers and what stands in their way.
 
 In a scenario: `[sky]`, one `[[receivers]]` each, what they have in common in `[receiver]`,
-`[[antennas]]`, `[[blockage]]` and `[[slips]]`. Numbers in dB and dB-Hz are plain; the others
-may have a unit.
+`[[antennas]]`, `[[blockage]]`, `[[slips]]` and `[products]`. Numbers in dB and dB-Hz are plain;
+the others may have a unit.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated
 
-from replay.configuration import Section, Table, build, literal, merge, quantity
-from replay.errors import ConfigurationError
-from replay.gnss.signals import frequency_hz
-from replay.simulate.air import SIGNED, Ionosphere, Troposphere
-from replay.simulate.antennas import Antenna, check_worn, read_antennas
-from replay.simulate.constellation import SYSTEMS
-
-KINDS: Final = ("vehicle", "static")
-BLOCKAGES: Final = ("canyon", "trees", "roof", "outage")
-FILTERS: Final = ("butterworth", "gauss-markov")
+from replay.configuration import Section, literal, quantity
+from replay.simulate.air import Ionosphere, Troposphere
+from replay.simulate.antennas import Antenna
+from replay.simulate.product_settings import Products, SatelliteBiases
 
 
 class Ephemerides(Section, frozen=True):
@@ -39,7 +33,12 @@ class Sky(Section, frozen=True):
     # A log with /gnss/nav, from the scenario's folder; none is the built-in constellation.
     navigation: str = ""
     shapiro: bool = False
+    wind_up: bool = False  # of the carrier phase; satellites stand nominally
+    tides: bool = False  # move the ground: solid Earth tide and pole tide
+    # Pole less the secular pole, towards Greenwich and towards 90 degrees west.
+    pole: tuple[Annotated[float, quantity("rad", "of the Earth's rotation")], ...] = (0.0, 0.0)
     errors: Ephemerides = Ephemerides()
+    biases: SatelliteBiases = SatelliteBiases()
     ionosphere: Ionosphere = Ionosphere()
     troposphere: Troposphere = Troposphere()
 
@@ -62,6 +61,7 @@ class Noise(Section, frozen=True):
     rate: Annotated[float, quantity("m/s", "Doppler as a range rate")] = 0.0
     weighted: bool = True  # 1 / sin(elevation)
     code_bias: Annotated[float, quantity("m", "of each signal, drawn once")] = 0.0
+    carrier_bias: Annotated[float, quantity("1", "cycles, of each signal, drawn once")] = 0.0
 
 
 class Multipath(Section, frozen=True):
@@ -156,6 +156,7 @@ class Setup:
     blockages : tuple of Blockage
     slips : tuple of Slip
     antennas : tuple of Antenna
+    products : Products or None
     folder : Path
         Of the scenario: names of files are from there.
     """
@@ -165,13 +166,16 @@ class Setup:
     blockages: tuple[Blockage, ...] = ()
     slips: tuple[Slip, ...] = ()
     antennas: tuple[Antenna, ...] = ()
+    products: Products | None = None
     folder: Path = dataclasses.field(default=Path(), compare=False)
 
     def to_toml(self) -> str:
         """Canonical TOML; empty without receivers."""
         if not self.receivers:
             return ""
-        lines = [*_lines("[sky]", "sky", self.sky)]
+        lines = [*table_lines("[sky]", "sky", self.sky)]
+        if self.products is not None:
+            lines += table_lines("[products]", "products", self.products)
         for name, sections in (
             ("receivers", self.receivers),
             ("antennas", self.antennas),
@@ -179,12 +183,12 @@ class Setup:
             ("slips", self.slips),
         ):
             for section in sections:
-                lines += _lines(f"[[{name}]]", name, section)
+                lines += table_lines(f"[[{name}]]", name, section)
         return "\n".join(lines)
 
 
-def _lines(head: str, path: str, section: Section) -> Iterator[str]:
-    """Lines of a table, its inner tables after it."""
+def table_lines(head: str, path: str, section: Section) -> Iterator[str]:
+    """Lines of a section as a table of TOML, its inner tables after it."""
     yield head
     inner, lists = [], []
     for name in section.__struct_fields__:
@@ -197,221 +201,7 @@ def _lines(head: str, path: str, section: Section) -> Iterator[str]:
             yield f"{name} = {literal(value)}"
     yield ""
     for name, value in inner:
-        yield from _lines(f"[{name}]", name, value)
+        yield from table_lines(f"[{name}]", name, value)
     for name, values in lists:
         for value in values:
-            yield from _lines(f"[[{name}]]", name, value)
-
-
-SectionT = TypeVar("SectionT", bound=Section)
-
-
-def _with_common(table: Table) -> Any:
-    """Tables of the receivers over what the section `receiver` says of all of them."""
-    common, own = table.pop("receiver", {}), table.pop("receivers", [])
-    if not isinstance(common, Mapping):
-        raise ConfigurationError("receiver is no table", mend="write [receiver]")
-    if not isinstance(own, list) or not all(isinstance(one, Mapping) for one in own):
-        return own  # told by `_many`
-    tables: list[Table] = []
-    for one in own:
-        both: Table = {}
-        merge(both, common)
-        merge(both, one)
-        tables.append(both)
-    return tables
-
-
-def take_setup(table: Table, folder: Path = Path()) -> Setup:
-    """Take the sections of observations out of a scenario's table.
-
-    Parameters
-    ----------
-    table : dict
-    folder : Path
-        What names of files are relative to.
-
-    Raises
-    ------
-    ConfigurationError
-        For an unknown key, a wrong type, an impossible value.
-    """
-    given = [name for name in ("sky", "antennas", "blockage", "slips") if name in table]
-    sky = _read(Sky, table.pop("sky", {}), "sky")
-    receivers = _many(Receiver, _with_common(table), "receivers")
-    antennas = read_antennas(table.pop("antennas", []))
-    blockages = _many(Blockage, table.pop("blockage", []), "blockage")
-    slips = _many(Slip, table.pop("slips", []), "slips")
-    if given and not receivers:
-        raise ConfigurationError(
-            f"there is a section {given[0]!r} but no receiver observes",
-            mend="write [[receivers]] with a name",
-        )
-    _check_sky(sky)
-    names = [receiver.name for receiver in receivers]
-    for index, receiver in enumerate(receivers):
-        _check_receiver(receiver, f"receivers[{index}]", sky)
-        if receiver.antenna:
-            check_worn(receiver.antenna, receiver.signals, antennas, f"receivers[{index}]")
-        if receiver.name in names[:index]:
-            raise ConfigurationError(f"two receivers are called {receiver.name!r}")
-    for index, blockage in enumerate(blockages):
-        _check_blockage(blockage, f"blockage[{index}]", names)
-    for index, slip in enumerate(slips):
-        _known(slip.receiver, names, f"slips[{index}]")
-    return Setup(sky, receivers, blockages, slips, antennas, folder)
-
-
-def _read(cls: type[SectionT], table: Any, where: str) -> SectionT:
-    if not isinstance(table, Mapping):
-        raise ConfigurationError(f"{where} is no table", mend=f"write [{where}]")
-    try:
-        return build(cls, [table])
-    except ConfigurationError as error:
-        raise ConfigurationError(error.what, where=where, mend=error.mend) from error
-
-
-def _many(cls: type[SectionT], tables: Any, name: str) -> tuple[SectionT, ...]:
-    if not isinstance(tables, list):
-        raise ConfigurationError(f"{name} is no list", mend=f"write [[{name}]], one each")
-    return tuple(_read(cls, table, f"{name}[{i}]") for i, table in enumerate(tables))
-
-
-def _known(name: str, names: list[str], where: str) -> None:
-    if name not in names:
-        known = ", ".join(names)
-        raise ConfigurationError(f"no receiver {name!r}", where=where, mend=f"known: {known}")
-
-
-def _check(section: Section, where: str, allowed: tuple[str, ...] = ()) -> None:
-    """Refuse negative numbers in a section and those below it."""
-    for name in section.__struct_fields__:
-        value = getattr(section, name)
-        if isinstance(value, Section):
-            _check(value, f"{where}.{name}", allowed)
-        elif isinstance(value, float | int) and name not in allowed and not value >= 0:
-            raise ConfigurationError(f"{where}.{name} is {value}", mend="write 0 or more")
-
-
-def _refuse(faults: tuple[tuple[bool, str, str], ...], where: str) -> None:
-    for wrong, what, mend in faults:
-        if wrong:
-            raise ConfigurationError(what, where=where, mend=mend)
-
-
-def _check_sky(sky: Sky) -> None:
-    _check(sky, "sky", SIGNED)
-    unknown = [system for system in sky.systems if system not in SYSTEMS]
-    times = (sky.errors.clock_tau, sky.ionosphere.tau, sky.troposphere.tau)
-    air, field = sky.ionosphere, sky.troposphere.field
-    told = (air.broadcast_alpha, air.broadcast_beta)
-    _refuse(
-        (
-            (
-                bool(unknown),
-                f"systems has {''.join(unknown)!r}",
-                f"letters of {SYSTEMS}",
-            ),
-            (len(set(sky.systems)) != len(sky.systems), "systems names one twice", "name it once"),
-            (min(times) == 0.0, "a correlation time is 0", "write more than 0"),
-            (
-                len(sky.ionosphere.alpha) != 4 or len(sky.ionosphere.beta) != 4,
-                "ionosphere.alpha and beta have four numbers each",
-                "write the eight of the message",
-            ),
-            (
-                any(len(numbers) not in (0, 4) for numbers in told),
-                "ionosphere.broadcast_alpha and broadcast_beta have four numbers each, or none",
-                "write the eight of the message",
-            ),
-            (
-                min(air.wave.length, air.front.width, field.length) == 0.0,
-                "a wave, a front or a field has no length",
-                "write more than 0 m",
-            ),
-        ),
-        "sky",
-    )
-
-
-def _check_receiver(receiver: Receiver, where: str, sky: Sky) -> None:
-    _check(receiver, where, ("bias", "drift", "latitude", "longitude", "height"))
-    static = receiver.kind == "static"
-    _refuse(
-        (
-            (
-                "/" in receiver.name or not receiver.name,
-                f"the name is {receiver.name!r}",
-                "write one without a slash",
-            ),
-            (
-                receiver.kind not in KINDS,
-                f"no kind {receiver.kind!r}",
-                f"one of {', '.join(KINDS)}",
-            ),
-            (receiver.rate == 0.0, "rate is 0 Hz", "more than 0"),
-            (
-                len(receiver.lever_arm) != 3,
-                "lever_arm has not three numbers",
-                "[forward, right, down]",
-            ),
-            (len(receiver.position) not in (0, 3), "position has not three numbers", "[x, y, z]"),
-            (
-                static and not receiver.position and receiver.latitude == receiver.longitude == 0.0,
-                "a static receiver has no position",
-                "give latitude, longitude, height, or position",
-            ),
-            (
-                receiver.multipath.filter not in FILTERS,
-                f"multipath.filter is {receiver.multipath.filter!r}",
-                f"one of {', '.join(FILTERS)}",
-            ),
-            (receiver.multipath.tau == 0.0, "multipath.tau is 0", "write more than 0"),
-            (
-                not 0.0 < receiver.multipath.cutoff < 0.5 * receiver.rate
-                and receiver.multipath.filter == "butterworth",
-                "multipath.cutoff is not below half of the rate",
-                "write a lower one",
-            ),
-            (not receiver.signals, "no signals", 'write ["G1C", "C2I"]'),
-        ),
-        where,
-    )
-    for signal in receiver.signals:
-        good = len(signal) == 3 and signal[0] in sky.systems and signal[1].isdigit()
-        try:
-            frequency_hz(signal[:1], int(signal[1])) if good else None
-        except KeyError:
-            good = False
-        good = good and (signal[0] != "R" or signal[1] in "12")  # no satellite sends CDMA here
-        if not good:
-            raise ConfigurationError(
-                f"no signal {signal!r}", where=where,
-                mend="a system of sky.systems and its RINEX band and attribute, as G1C",
-            )  # fmt: skip
-    for gap in receiver.gaps:
-        if len(gap) != 2 or not 0.0 <= gap[0] < gap[1]:
-            raise ConfigurationError(f"gaps holds {list(gap)}", where=where, mend="[begin, end]")
-
-
-def _check_blockage(blockage: Blockage, where: str, names: list[str]) -> None:
-    _check(blockage, where)
-    for name in blockage.receivers:
-        _known(name, names, where)
-    _refuse(
-        (
-            (
-                blockage.kind not in BLOCKAGES,
-                f"no kind {blockage.kind!r}",
-                f"one of {', '.join(BLOCKAGES)}",
-            ),
-            (not blockage.begin < blockage.end, "it ends before it begins", "swap them"),
-            (
-                0.0 < blockage.every <= blockage.end - blockage.begin,
-                "it comes again before it ends",
-                "write a longer `every`",
-            ),
-            (max(blockage.left, blockage.right) > 1.5, "a wall is upright", "stay below 85 deg"),
-        ),
-        where,
-    )
+            yield from table_lines(f"[[{name}]]", name, value)

@@ -21,9 +21,10 @@ from replay.log.columns import Columns
 from replay.simulate import glonass
 from replay.simulate.air import NODES_PER_TAU, air_record
 from replay.simulate.constellation import constellation, messages, name_of, perturb, refer
+from replay.simulate.ground import displace
 from replay.simulate.navigation import LIMITS_S, read_sky
 from replay.simulate.noise import Floats, normals
-from replay.simulate.sky import Ephemerides, Receiver, Setup
+from replay.simulate.sky import Ephemerides, Receiver, Setup, Sky
 from replay.simulate.trajectory import Trajectory, ecef_of
 
 Records = npt.NDArray[np.void]
@@ -98,6 +99,10 @@ class Epochs:
     clock : float64 array (e, 2)
         Bias (s) and drift (s/s).
     positions, velocities : float64 arrays (e, 3), m and m/s, ECEF
+    crust : float64 array (e, 3), m, ECEF
+        The same places on ground that no tide moves, which are those of the truth.
+    tides : tuple of two float64 arrays (e, 3), m, ECEF, or None
+        What solid Earth tide and pole tide add; None without tides.
     headings : float64 array (e,), rad
     interval_s : float, s
     """
@@ -108,6 +113,8 @@ class Epochs:
     velocities: Floats
     headings: Floats
     interval_s: float
+    crust: Floats
+    tides: tuple[Floats, Floats] | None = None
 
 
 def make_sky(setup: Setup, scene: Scene) -> TrueSky:
@@ -177,8 +184,22 @@ def wander(seed: int, source: str, tau_s: float, span_s: float, count: int) -> F
     return np.ascontiguousarray(series.T)
 
 
-def make_epochs(receiver: Receiver, scene: Scene) -> Epochs:
+def make_epochs(receiver: Receiver, scene: Scene, sky: Sky) -> Epochs:
     """Epochs by the receiver's clock, and the antenna at their true times."""
+    epochs = _still_ground(receiver, scene)
+    if not sky.tides:
+        return epochs
+    times = scene.start_ns + epochs.elapsed_ns
+    solid, polar, rates = displace(epochs.crust, times, scene.start_ns, sky.pole)
+    return dataclasses.replace(
+        epochs,
+        positions=epochs.crust + solid + polar,
+        velocities=epochs.velocities + rates,
+        tides=(solid, polar),
+    )
+
+
+def _still_ground(receiver: Receiver, scene: Scene) -> Epochs:
     period_ns = round(time.NS_PER_S / receiver.rate)
     interval_s = period_ns / time.NS_PER_S
     elapsed = np.arange(1, scene.end_ns // period_ns + 1, dtype=np.int64) * period_ns
@@ -198,13 +219,11 @@ def make_epochs(receiver: Receiver, scene: Scene) -> Epochs:
         place = np.array(receiver.position) if receiver.position else ecef_of(
             receiver.latitude, receiver.longitude, receiver.height
         )  # fmt: skip
-        still = np.zeros((count, 3))
-        return Epochs(
-            elapsed, clock, np.tile(place, (count, 1)), still, np.zeros(count), interval_s
-        )
+        still, places = np.zeros((count, 3)), np.tile(place, (count, 1))
+        return Epochs(elapsed, clock, places, still, np.zeros(count), interval_s, places)
     true_s = elapsed / time.NS_PER_S - clock[:, 0] - receiver.delay
     poses = scene.trajectory.poses(np.maximum(true_s, 0.0))
     positions, velocities, none = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, 3))
     antenna_fixes(poses, np.array(receiver.lever_arm), none, none, positions, velocities)
     headings = np.ascontiguousarray(poses["attitude"][:, 2])
-    return Epochs(elapsed, clock, positions, velocities, headings, interval_s)
+    return Epochs(elapsed, clock, positions, velocities, headings, interval_s, positions)

@@ -17,11 +17,11 @@ from replay.log.digest import ChannelDigest
 from replay.log.writer import LogWriter
 from replay.schemas import gnss_pb2
 from replay.simulate import gnss, imu
-from replay.simulate.defaults import defaults_toml
+from replay.simulate.defaults import defaults_toml, unit_toml
 from replay.simulate.motion import Moved, move
 from replay.simulate.observations import SIMULATED, observe
 from replay.simulate.scenario import Scenario, load_scenario
-from replay.simulate.settings import Settings
+from replay.simulate.settings import Settings, Unit
 from replay.simulate.trajectory import Trajectory
 from replay.simulate.truth import Scene
 
@@ -80,8 +80,12 @@ def write_log(scenario: Scenario, out: Path) -> SimulationResult:
     with LogWriter(out) as writer:
         for topic in rows:
             writer.add_channel(topic, _message(topic))
-        defaults = defaults_toml(scenario.settings, scenario.defaults, scenario.setup.receivers)
+        defaults = defaults_toml(scenario.settings, scenario.defaults, scenario.setup)
         writer.add_metadata(DEFAULTS, {"toml": defaults})
+        for unit in scenario.units:
+            writer.add_metadata(
+                f"{DEFAULTS}.{unit.name}", {"toml": unit_toml(scenario.settings, unit)}
+            )
         if told:
             writer.add_metadata(SIMULATED, told)
         for batch in _batches(rows):
@@ -144,6 +148,8 @@ def make_all(
             {"angular_rate_body_rad_s": data.rates, "specific_force_body_m_s2": data.forces},
         )
     }
+    for unit in scenario.units:
+        rows[channels.IMU_UNIT.at(unit=unit.name)] = _unit(unit, moved, end_ns, settings.seed)
     if settings.gnss.fixes:
         fixes = _fixes(settings, trajectory, start_ns, end_ns)
         rows[channels.GNSS_FIX.at(receiver=settings.gnss.receiver)] = fixes
@@ -155,6 +161,26 @@ def make_all(
         rows.update(observed)
     rows[channels.TRUTH.topic] = _truth(settings, trajectory, data, start_ns, end_ns)
     return rows, told
+
+
+def _unit(unit: Unit, moved: Moved, end_ns: int, seed: int) -> Columns:
+    """Samples of a further inertial unit until the last one of the first."""
+    period_ns = round(time.NS_PER_S / unit.rate)
+    samples, interval_s = end_ns // period_ns, period_ns / time.NS_PER_S
+    trajectory = Trajectory.follow(moved.trajectory.motion, interval_s, samples)
+    data = imu.measure(
+        trajectory.rates,
+        trajectory.forces,
+        trajectory.speeds(),
+        interval_s,
+        unit.errors,
+        seed,
+        f"imu.{unit.name}",
+    )
+    return Columns.build(
+        moved.start_ns + np.arange(1, samples + 1, dtype=np.int64) * period_ns,
+        {"angular_rate_body_rad_s": data.rates, "specific_force_body_m_s2": data.forces},
+    )
 
 
 def _fixes(settings: Settings, trajectory: Trajectory, start_ns: int, end_ns: int) -> Columns:
