@@ -22,6 +22,16 @@ WrongFixLimit = Annotated[
 ]
 
 
+ReferencePoint = Annotated[
+    str | None,
+    typer.Option(
+        "--reference",
+        help="Where a receiver stands still, instead of the log's truth: X,Y,Z in metres, ECEF,"
+        " or `mean` for the mean of the last half of the run.",
+    ),
+]
+
+
 @app.command()
 def evaluate(
     log: Annotated[Path, typer.Argument(help="Log of a run, with truth.")],
@@ -33,12 +43,30 @@ def evaluate(
         bool, typer.Option("--fixed-truth-only", help="Leave out truth that is not fixed.")
     ] = False,
     wrong_fix_limit: WrongFixLimit = 0.10,
+    reference: ReferencePoint = None,
+    limit: Annotated[
+        str, typer.Option(help="Within which a receiver that stands still has converged.")
+    ] = "10 cm",
+    hold: Annotated[str, typer.Option(help="For how long, besides to the end.")] = "10 min",
+    start_up: Annotated[
+        str, typer.Option(help="Left out of the figures of a receiver that stands still.")
+    ] = "1 h",
+    session: Annotated[
+        str | None, typer.Option(help="Cut such a run into sessions so long, as 6 h.")
+    ] = None,
 ) -> None:
-    """Compare a run with the truth in its log."""
+    """Compare a run with the truth in its log, or with where its receiver stands still."""
     from replay.evaluate import evaluate_run, print_evaluation
+    from replay.evaluate.station_options import station_options
 
     evaluation = evaluate_run(
-        log, run=run, fixed_truth_only=fixed_truth_only, wrong_fix_limit_m=wrong_fix_limit
+        log,
+        run=run,
+        fixed_truth_only=fixed_truth_only,
+        wrong_fix_limit_m=wrong_fix_limit,
+        station=station_options(
+            reference=reference, limit=limit, hold=hold, start_up=start_up, session=session
+        ),
     )
     if as_json:
         typer.echo(json.dumps(evaluation.to_json_dict(), indent=2))
@@ -172,11 +200,14 @@ def view(
     log: Annotated[Path, typer.Argument(help="Log of a run.")],
     output: Output,
     png: Annotated[Path | None, typer.Option(help="Render the recording to a picture too.")] = None,
+    reference: ReferencePoint = None,
 ) -> None:
     """Write a Rerun recording of a run."""
-    from replay.view.recording import write_recording
+    from replay.evaluate.station_options import parse_reference
+    from replay.view.recording import RecordingOptions, write_recording
 
-    write_recording(log, output)
+    place = None if reference is None else parse_reference(reference)
+    write_recording(log, output, options=RecordingOptions(reference=place))
     say(f"recording: {output} (open it with: rerun {output})")
     if png is not None:
         from replay.view.picture import render_png
@@ -190,20 +221,27 @@ def report(
     log: Annotated[Path, typer.Argument(help="Log of a run.")],
     output: Output,
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
+    reference: ReferencePoint = None,
 ) -> None:
     """Write one self-contained HTML page about a run."""
     from replay.evaluate import evaluate_run, runs_of
+    from replay.evaluate.station import StationOptions
+    from replay.evaluate.station_options import parse_reference
     from replay.view.report import write_report
 
+    place = None if reference is None else parse_reference(reference)
+    station = StationOptions(reference=place)
     evaluation: dict[str, Any] | None
     try:
         names = runs_of(log)
         if len(names) > 1:
-            evaluation = {name: evaluate_run(log, run=name).to_json_dict() for name in names}
+            evaluation = {
+                name: evaluate_run(log, run=name, station=station).to_json_dict() for name in names
+            }
         else:
-            evaluation = evaluate_run(log).to_json_dict()
+            evaluation = evaluate_run(log, station=station).to_json_dict()
     except MissingChannelError as error:
         evaluation = None
         warn(f"no figures against truth: {error.what}")
-    write_report(log, output, evaluation=evaluation, title=title)
+    write_report(log, output, evaluation=evaluation, title=title, reference=place)
     say(f"report: {output}")

@@ -15,6 +15,7 @@ from replay import channels
 from replay.errors import MissingChannelError, UsageError
 from replay.evaluate.align import Rows
 from replay.evaluate.geometry import Floats
+from replay.evaluate.station import Reference, reference_rows
 from replay.log.columns import Columns, concatenate
 from replay.log.reader import LogReader
 
@@ -54,7 +55,9 @@ class RunChannels:
     metadata: Metadata = dataclasses.field(default_factory=dict)
 
 
-def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
+def read_run(
+    run_log: Path, *, run: str | None = None, reference: Reference | None = None
+) -> RunChannels:
     """Channels of a run in a log.
 
     Parameters
@@ -63,6 +66,8 @@ def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
     run : str, optional
         Name of the run; may be left out where the log has one, or one of the name that
         its manifest gives.
+    reference : "mean", or tuple of 3 float (m, ECEF), optional
+        Truth of a point that stands still, instead of the log's.
 
     Raises
     ------
@@ -76,11 +81,12 @@ def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
     with LogReader(run_log) as reader:
         topics = sorted(reader.channels)
         name = _run_name(run_names(topics), run, reader.metadata, str(run_log))
-        if channels.TRUTH.topic not in topics:
+        if channels.TRUTH.topic not in topics and reference is None:
             raise MissingChannelError(
                 "the log has no truth",
                 where=f"{run_log}, {channels.TRUTH.topic}",
-                mend="import or simulate the input with truth and run again",
+                mend="import or simulate the input with truth and run again, or give the place of"
+                " a receiver that stands still (`replay evaluate --reference`)",
             )
 
         optional = (
@@ -96,7 +102,11 @@ def read_run(run_log: Path, *, run: str | None = None) -> RunChannels:
         return RunChannels(
             run=name,
             solution=found[of_run["SOLUTION"]],
-            truth=found[channels.TRUTH.topic],
+            truth=(
+                found[channels.TRUTH.topic]
+                if reference is None
+                else reference_rows(found[of_run["SOLUTION"]], reference)
+            ),
             innovations=found.get(of_run["FILTER_INNOVATIONS"]),
             fixes=concatenate(fixes) if fixes else None,
             geometry=found.get(of_run["FILTER_GEOMETRY"]),

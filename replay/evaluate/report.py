@@ -11,6 +11,7 @@ from replay.evaluate.availability import Availability
 from replay.evaluate.consistency import Consistency, Nees
 from replay.evaluate.outages import Outage, OutageSummary
 from replay.evaluate.satellites import Geometry
+from replay.evaluate.station import Station
 from replay.evaluate.statistics import Statistics
 
 
@@ -84,6 +85,8 @@ class Evaluation(msgspec.Struct, frozen=True, kw_only=True):
     ambiguities : Ambiguities or None
     availability : Availability or None
         None where the log has no observations.
+    station : Station or None
+        None where truth moves.
     counts : Counts
     """
 
@@ -105,6 +108,7 @@ class Evaluation(msgspec.Struct, frozen=True, kw_only=True):
     geometry: Geometry | None
     ambiguities: Ambiguities | None
     availability: Availability | None
+    station: Station | None
     counts: Counts
 
     def to_json_dict(self) -> dict[str, Any]:

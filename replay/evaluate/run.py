@@ -24,6 +24,7 @@ from replay.evaluate.errors_enu import (
 from replay.evaluate.read import RunChannels, read_run
 from replay.evaluate.report import Counts, Evaluation
 from replay.evaluate.satellites import geometry_of
+from replay.evaluate.station import Station, StationOptions, station_of, still_point
 from replay.evaluate.statistics import ANGLES, by_axis, by_local_axis
 from replay.evaluate.status import updated
 from replay.log.columns import Columns
@@ -39,6 +40,7 @@ def evaluate_run(
     run: str | None = None,
     fixed_truth_only: bool = False,
     wrong_fix_limit_m: float = WRONG_FIX_LIMIT_M,
+    station: StationOptions | None = None,
 ) -> Evaluation:
     """Errors, drifts and consistency of a run in a log, against the log's truth.
 
@@ -52,6 +54,8 @@ def evaluate_run(
         Leave out rows of truth whose ambiguities are not fixed.
     wrong_fix_limit_m : float, m
         Horizontal error over which a fixed position counts as wrong.
+    station : StationOptions, optional
+        How a point that stands still is measured, and where it is.
 
     Raises
     ------
@@ -63,9 +67,10 @@ def evaluate_run(
         Where it cannot be read.
     """
     return evaluate_channels(
-        read_run(run_log, run=run),
+        read_run(run_log, run=run, reference=station.reference if station else None),
         fixed_truth_only=fixed_truth_only,
         wrong_fix_limit_m=wrong_fix_limit_m,
+        station=station,
     )
 
 
@@ -74,6 +79,7 @@ def evaluate_channels(
     *,
     fixed_truth_only: bool = False,
     wrong_fix_limit_m: float = WRONG_FIX_LIMIT_M,
+    station: StationOptions | None = None,
 ) -> Evaluation:
     """Errors, drifts and consistency of a run whose channels were read.
 
@@ -141,6 +147,7 @@ def evaluate_channels(
             solution, updated(solution), position, data.resolution, wrong_fix_limit_m
         ),
         availability=availability_of(solution, data.observations_ns),
+        station=_station(data, solution, position, station or StationOptions()),
         counts=Counts(
             solution_rows=len(solution),
             truth_rows=len(known),
@@ -154,6 +161,25 @@ def evaluate_channels(
             position_updates=None if rejections is None else len(updates),
             position_rejections=rejections,
         ),
+    )
+
+
+def _station(
+    data: RunChannels, solution: Columns, position: Errors, options: StationOptions
+) -> Station | None:
+    """Figures of a point that stands still; None where truth moves."""
+    place = still_point(data.truth)
+    if place is None or len(position) == 0:
+        return None
+    seen = data.observations_ns
+    given = "given" if isinstance(options.reference, tuple) else options.reference
+    return station_of(
+        solution,
+        position,
+        place,
+        options,
+        name=given or "truth",
+        start_ns=int(seen[0]) if seen is not None and len(seen) else None,
     )
 
 

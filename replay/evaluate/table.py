@@ -12,6 +12,7 @@ from replay.evaluate.consistency import Consistency
 from replay.evaluate.outages import Outage
 from replay.evaluate.report import Evaluation
 from replay.evaluate.satellites import Geometry, Spread
+from replay.evaluate.station_table import print_station
 from replay.evaluate.statistics import Statistics
 
 _FIGURES: Final = ("mean", "std", "rms", "p95", "max")
@@ -34,6 +35,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
             " its lever arm and the truth's attitude are known[/dim]"
         )
     _print_gnss(evaluation, console)
+    if evaluation.station is not None:
+        print_station(evaluation.station, console)
     if evaluation.outages:
         console.print(_outage_table(evaluation.outages))
         summary = evaluation.outage_summary

@@ -27,6 +27,8 @@ RAW: Final = "Raw"
 SATELLITES: Final = "Satellites"
 AMBIGUITIES: Final = "Ambiguities"
 CORRECTIONS: Final = "Corrections"
+CONVERGENCE: Final = "Convergence"
+ESTIMATES: Final = "Atmosphere & biases"
 NETWORK: Final = "Network"
 NETWORK_ERRORS: Final = "Network errors"
 ABOUT: Final = "About"
@@ -40,9 +42,13 @@ _SENSOR_SECTIONS: Final = (
     Section.NON_SLIP,
     Section.SQUAT,
 )  # fmt: skip
+_SETTLING_SECTIONS: Final = (
+    *_SENSOR_SECTIONS, Section.CONVERGENCE, Section.TROPOSPHERE, Section.PHASES,
+)  # fmt: skip
 _SATELLITE_SECTIONS: Final = (
     Section.GEOMETRY, Section.CLOCK, Section.DISPLACEMENT, Section.SLIPS,
 )  # fmt: skip
+_ESTIMATE_SECTIONS: Final = (Section.TROPOSPHERE, Section.IONOSPHERE, Section.RECEIVER_BIASES)
 Part = rrb.Container | rrb.View
 _MAX_CURVES_IN_LEGEND: Final = 12
 _EQUATOR_M: Final = 40_075_016.7  # 2 pi times the semi-major axis of WGS 84
@@ -94,10 +100,12 @@ def make_blueprint(contents: Contents, *, active_tab: str | None = None) -> rrb.
     """
     tabs: list[tuple[str, list[Part]]] = [
         (OVERVIEW, _overview(contents)),
+        (CONVERGENCE, _rows(contents, (Section.CONVERGENCE,))),
         (MOTION, _rows(contents, _MOTION_SECTIONS)),
         (SENSORS, _rows(contents, _SENSOR_SECTIONS)),
         (SATELLITES, _rows(contents, _SATELLITE_SECTIONS)),
-        (AMBIGUITIES, _rows(contents, (Section.AMBIGUITIES,))),
+        (AMBIGUITIES, _rows(contents, (Section.AMBIGUITIES, Section.PHASES))),
+        (ESTIMATES, _rows(contents, _ESTIMATE_SECTIONS)),
         (INNOVATIONS, _rows(contents, (Section.INNOVATIONS, Section.NIS, Section.RESIDUALS))),
         (CORRECTIONS, _rows(contents, (Section.CORRECTIONS,))),
         (NETWORK, _network(contents)),
@@ -163,14 +171,14 @@ def _row(contents: Contents, panels: Sequence[Panel]) -> list[Part]:
         names = {curve.label for curve in panel.curves}
         legend = not names <= told and len(panel.curves) <= _MAX_CURVES_IN_LEGEND
         told |= names
-        # Bounds of sensor errors are wide at first, those of all else in the middle or at the end.
-        settles = panel.section in _SENSOR_SECTIONS
+        # Bounds of what settles are wide at first, those of all else in the middle or at the end.
+        settles = panel.section in _SETTLING_SECTIONS
         corner = rrb.Corner2D.RightTop if settles else rrb.Corner2D.LeftTop
         views.append(
             _plot(
                 contents,
                 f"plots/{panel.key}",
-                panel.heading,
+                panel.linear_heading,
                 legend=legend,
                 corner=corner,
                 limits=panel.limits,

@@ -213,7 +213,10 @@ def _draw_panel(ax: Axes, item: Panel, pen: _Pen, outages: Sequence[Span]) -> No
         _draw_curve(ax, curve, pen)
     ax.set_title(item.heading)
     ax.set_xlim(float(clock.elapsed(clock.start_ns)), float(clock.elapsed(clock.end_ns)))
-    ax.yaxis.set_major_locator(MaxNLocator(5))
+    if item.logarithmic:
+        ax.set_yscale("log")
+    else:
+        ax.yaxis.set_major_locator(MaxNLocator(5))
     ax.margins(y=0.06)
     if item.limits is not None:
         ax.set_ylim(*item.limits)

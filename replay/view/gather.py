@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from replay import channels
 from replay.evaluate.outages import Span
+from replay.evaluate.station import Reference, reference_rows
 from replay.evaluate.status import updated
 from replay.log.columns import Columns, concatenate
 from replay.view.outages import find_outages
@@ -40,6 +41,10 @@ KEPT = (
     channels.FILTER_INNOVATIONS,
     channels.FILTER_CLOCKS,
     channels.FILTER_GEOMETRY,
+    channels.FILTER_TROPOSPHERE,
+    channels.FILTER_IONOSPHERE,
+    channels.FILTER_BIASES,
+    channels.FILTER_PHASES,
     channels.FILTER_AMBIGUITIES,
     channels.FILTER_RESOLUTION,
     channels.FILTER_EVENTS,
@@ -94,6 +99,10 @@ class Run:
     geometry: Columns | None = None
     ambiguities: Columns | None = None
     resolution: Columns | None = None
+    troposphere: Columns | None = None
+    ionosphere: Columns | None = None
+    biases: Columns | None = None
+    phases: Columns | None = None
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -160,6 +169,7 @@ def gather(
     metadata: Mapping[str, Mapping[str, str]],
     *,
     on_imu: ImuConsumer | None = None,
+    reference: Reference | None = None,
 ) -> RunData:
     """Read batches to their end.
 
@@ -171,6 +181,8 @@ def gather(
         Metadata records of the log.
     on_imu : callable or None
         Gets each batch of inertial samples as it comes.
+    reference : "mean", or tuple of 3 float (m, ECEF), or None
+        Where the receiver stands still, instead of the log's truth; "mean": of the first run.
 
     Returns
     -------
@@ -197,8 +209,10 @@ def gather(
     fixes = _by_part(whole, channels.GNSS_FIX, "receiver")
     runs = _runs(whole, {name: join_sigmas(sigmas[name]) for name in sorted(sigmas)})
     ends = [int(r.solution.valid_time_ns[-1]) for r in runs if r.solution is not None]
+    solutions = [run.solution for run in runs if run.solution is not None]
+    given = None if reference is None or not solutions else reference_rows(solutions[0], reference)
     return RunData(
-        truth=whole.get(channels.TRUTH.topic),
+        truth=whole.get(channels.TRUTH.topic) if given is None else given,
         fixes=fixes,
         observations=_by_part(whole, channels.GNSS_OBS, "receiver"),
         runs=runs,
@@ -257,6 +271,10 @@ def _runs(whole: Mapping[str, Columns], sigmas: Mapping[str, Sigmas]) -> tuple[R
             ("geometry", channels.FILTER_GEOMETRY),
             ("ambiguities", channels.FILTER_AMBIGUITIES),
             ("resolution", channels.FILTER_RESOLUTION),
+            ("troposphere", channels.FILTER_TROPOSPHERE),
+            ("ionosphere", channels.FILTER_IONOSPHERE),
+            ("biases", channels.FILTER_BIASES),
+            ("phases", channels.FILTER_PHASES),
         )
     }
     names = sorted({name for found in of.values() for name in found} | set(sigmas))

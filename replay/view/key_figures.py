@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from replay.view.labels import MINUS, NONE
 from replay.view.markup import Table
+from replay.view.station_figures import station_tables, station_tiles
 
 _STATISTICS: Final = ("mean", "std", "rms", "p95", "max")
 _ERRORS: Final = (
@@ -42,7 +43,7 @@ _TILES: Final = (
 )
 _WORDS: Final = {"3d": "3D", "nees": "NEES", "nis": "NIS", "none": ""}
 _TOLD: Final = {key for key, *_ in _ERRORS + _WITH_OUTAGES} | {
-    "outages", "run", "start_ns", "geometry", "ambiguities", "availability",
+    "outages", "run", "start_ns", "geometry", "ambiguities", "availability", "station",
 }  # fmt: skip
 _SYSTEMS: Final = {
     "gps": "GPS", "glonass": "GLONASS", "galileo": "Galileo", "beidou": "BeiDou", "qzss": "QZSS",
@@ -74,6 +75,7 @@ def headline(evaluation: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         share = _at(evaluation, quantity, key, *(["fixed"] if quantity == "ambiguities" else []))
         if share is not None:
             found.append((label, number(100.0 * share, 1), "%"))
+    found += station_tiles(_mapping(evaluation.get("station")))
     if drifts:
         found.append(("Worst horizontal drift in outages", number(max(drifts), 2), "m"))
     return found
@@ -89,6 +91,7 @@ def tables(evaluation: Mapping[str, Any]) -> list[Table]:
         *_outage_table(evaluation),
         *_geometry_table(evaluation),
         *_ambiguity_table(evaluation),
+        *station_tables(_mapping(evaluation.get("station"))),
         *_consistency_table(evaluation),
         *_other_table(evaluation),
     ]

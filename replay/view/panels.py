@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from replay.evaluate.geometry import Floats
 from replay.view.palette import Ink
+from replay.view.thinning import line_rows
 
 _GAP_INTERVALS: Final = 3.0
 _GAP_LEAST_NS: Final = 1.5e9
@@ -50,6 +51,11 @@ class Section(enum.Enum):
     CLOCK = "Receiver clock"
     DISPLACEMENT = "Carrier-phase displacement"
     AMBIGUITIES = "Ambiguities"
+    PHASES = "Ambiguities of single phases"
+    TROPOSPHERE = "Troposphere"
+    IONOSPHERE = "Ionosphere"
+    RECEIVER_BIASES = "Biases of the receiver"
+    CONVERGENCE = "Convergence"
     RESIDUALS = "Residuals per satellite"
     SLIPS = "Cycle slips"
     CORRECTIONS = "Corrections per satellite"
@@ -111,6 +117,9 @@ class Panel:
         From back to front; none is empty.
     limits : (float, float) or None
         Of the y axis, where rare great values would hide the rest; None for what fits.
+    logarithmic : bool
+        Whether the y axis is; all values are above nought then. The recording, whose axes are
+        linear, shows the logarithm to the base ten.
     """
 
     section: Section
@@ -120,11 +129,21 @@ class Panel:
     unit: str
     curves: tuple[Curve, ...]
     limits: tuple[float, float] | None = None
+    logarithmic: bool = False
 
     @property
     def heading(self) -> str:
         """Title and unit."""
         return f"{self.title} [{self.unit}]"
+
+    @property
+    def linear_heading(self) -> str:
+        """Title and unit where the axis is linear."""
+        return f"{self.title} [log₁₀ {self.unit}]" if self.logarithmic else self.heading
+
+    def linear(self, values: Floats) -> Floats:
+        """Values of a curve for a linear axis."""
+        return np.log10(values) if self.logarithmic else values
 
 
 def panel(
@@ -136,10 +155,12 @@ def panel(
     *,
     row: str = "",
     limits: tuple[float, float] | None = None,
+    logarithmic: bool = False,
 ) -> list[Panel]:
     """A list of one panel of the curves that have rows; an empty list where none has."""
     kept = tuple(curve for curve in curves if len(curve.times_ns))
-    return [Panel(section, row or section.value, key, title, unit, kept, limits)] if kept else []
+    heading = row or section.value
+    return [Panel(section, heading, key, title, unit, kept, limits, logarithmic)] if kept else []
 
 
 def broken(curve: Curve) -> Curve:
@@ -160,6 +181,12 @@ def broken(curve: Curve) -> Curve:
         times_ns=np.insert(curve.times_ns, after, middle),
         values=np.insert(curve.values, after, np.nan, axis=0),
     )
+
+
+def thinned(curve: Curve, bins: int) -> Curve:
+    """The line with the first, least, greatest and last row of each of so many spans."""
+    rows = line_rows(curve.values, bins)
+    return dataclasses.replace(curve, times_ns=curve.times_ns[rows], values=curve.values[rows])
 
 
 def robust_limits(

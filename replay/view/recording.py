@@ -14,11 +14,13 @@ import rerun as rr
 
 from replay.errors import ReplayError
 from replay.evaluate.geometry import Floats
+from replay.evaluate.station import Reference
 from replay.log.columns import Columns
 from replay.time import to_text
 from replay.view import labels
 from replay.view.about import about_markdown
 from replay.view.blueprint import Contents, make_blueprint
+from replay.view.convergence_panels import convergence_panels
 from replay.view.events import events_of
 from replay.view.fields import doubles
 from replay.view.filter_panels import innovation_panels, sensor_panels
@@ -30,6 +32,7 @@ from replay.view.network_panels import network_panels
 from replay.view.network_scene import draw_stations
 from replay.view.palette import AXES
 from replay.view.panels import Panel
+from replay.view.precise_panels import precise_panels
 from replay.view.satellite_panels import satellite_panels
 from replay.view.scene import Scene, draw_scene
 from replay.view.sink import Sink, Times, rgba
@@ -57,12 +60,15 @@ class RecordingOptions:
         Whether inertial samples are drawn.
     active_tab : str or None
         Tab that is open at first.
+    reference : "mean", or tuple of 3 float (m, ECEF), or None
+        Where the receiver stands still, instead of the log's truth.
     """
 
     ellipsoid_exaggeration: int | None = None
     max_path_points: int = 200_000
     imu: bool = True
     active_tab: str | None = None
+    reference: Reference | None = None
 
 
 def write_recording(
@@ -102,7 +108,7 @@ def record(
     chosen = options or RecordingOptions()
     with recording_file(out_rrd, name, metadata) as sink:
         imu = _ImuPlots(sink) if chosen.imu else None
-        data = gather(batches, metadata, on_imu=imu)
+        data = gather(batches, metadata, on_imu=imu, reference=chosen.reference)
         scene = draw_scene(
             sink,
             data,
@@ -129,10 +135,12 @@ def all_panels(data: RunData) -> list[Panel]:
     """Every plot of a run but the inertial ones, in the order of the tabs."""
     return [
         *navigation_panels(data),
+        *convergence_panels(data),
         *sensor_panels(data),
         *geometry_panels(data),
         *innovation_panels(data),
         *satellite_panels(data),
+        *precise_panels(data),
         *network_panels(data),
         *gnss_panels(data),
     ]

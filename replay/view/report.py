@@ -12,6 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, Final
 
+from replay.evaluate.station import Reference
 from replay.schemas import replay_pb2
 from replay.time import seconds_between, to_text
 from replay.view import key_figures
@@ -22,7 +23,7 @@ from replay.view.files import write_page
 from replay.view.gather import Batches, RunData, gather
 from replay.view.histogram_chart import histogram_chart
 from replay.view.imu_envelope import ImuEnvelope
-from replay.view.labels import BOUNDS, NONE
+from replay.view.labels import BOUNDS, NONE, SIGMA
 from replay.view.markup import Table, figure, page, section, tiles
 from replay.view.panels import Panel, Section
 from replay.view.plan_chart import plan_chart
@@ -40,6 +41,11 @@ _STACKED: Final = {
     Section.ATTITUDE_ERROR: f"Solution minus truth, wrapped, with {BOUNDS} of the solution.",
 }
 _GROUPS: Final = (
+    (
+        "Convergence",
+        (Section.CONVERGENCE,),
+        "A receiver that stands still: solution minus its place, and the size of that.",
+    ),
     (
         "Velocity and attitude",
         (Section.VELOCITY, Section.ATTITUDE),
@@ -75,6 +81,16 @@ _GROUPS: Final = (
     ),
     ("Ambiguities", (Section.AMBIGUITIES,), "Integer ambiguities, epoch by epoch."),
     (
+        "Ambiguities of single phases",
+        (Section.PHASES,),
+        "What is estimated of each carrier phase, less what it came to at the end of its arc.",
+    ),
+    (
+        "Atmosphere and biases",
+        (Section.TROPOSPHERE, Section.IONOSPHERE, Section.RECEIVER_BIASES),
+        f"Delays in the zenith and towards satellites, biases of codes, with {BOUNDS} or {SIGMA}.",
+    ),
+    (
         "Innovations",
         (Section.INNOVATIONS,),
         f"Measurement minus prediction, with {BOUNDS}; crosses were rejected.",
@@ -106,6 +122,7 @@ def write_report(
     *,
     evaluation: Mapping[str, Any] | None = None,
     title: str | None = None,
+    reference: Reference | None = None,
 ) -> None:
     """Write the report of a run log.
 
@@ -120,6 +137,8 @@ def write_report(
         as they are there.
     title : str or None
         Heading; None takes the log's name.
+    reference : "mean", or tuple of 3 float (m, ECEF), or None
+        Where the receiver stands still, instead of the log's truth.
 
     Raises
     ------
@@ -132,6 +151,7 @@ def write_report(
             source.metadata,
             evaluation=evaluation,
             title=title or run_log.stem,
+            reference=reference,
         )
     write_page(out_html, text)
 
@@ -142,10 +162,11 @@ def report_html(
     *,
     evaluation: Mapping[str, Any] | None = None,
     title: str,
+    reference: Reference | None = None,
 ) -> str:
     """The report as text; see :func:`write_report`."""
     envelope = ImuEnvelope()
-    data = gather(batches, metadata, on_imu=envelope)
+    data = gather(batches, metadata, on_imu=envelope, reference=reference)
     panels = [*_shown(data, all_panels(data)), *envelope.panels()]
     manifest = manifest_of(metadata)
     parts = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from typing import Final
 
@@ -23,8 +22,8 @@ from replay.view.panels import (
     finite_curve,
     panel,
     robust_limits,
+    thinned,
 )
-from replay.view.thinning import line_rows
 
 _NO_SATELLITE: Final = "---"
 _BINS: Final = 150  # of a curve of a correction in the recording: they are smooth
@@ -37,7 +36,14 @@ _CORRECTIONS: Final = (
     ("group_delay_m", "Group delay", "satellite"),
     ("sagnac_m", "Earth's turning", "space"),
     ("shapiro_m", "Shapiro delay", "space"),
-    ("antenna_m", "Receiver's antenna", "space"),
+    ("antenna_m", "Receiver's antenna", "antennas"),
+    ("satellite_antenna_m", "Satellite's antenna", "antennas"),
+    ("wind_up_m", "Wind-up of the phase", "antennas"),
+    ("solid_tide_m", "Tide of the solid Earth", "ground"),
+    ("pole_tide_m", "Pole tide", "ground"),
+    ("ocean_loading_m", "Ocean loading", "ground"),
+    ("phase_bias_m", "Satellite's bias of the phase", "biases"),
+    ("higher_ionosphere_m", "Ionosphere, second order", "biases"),
 )
 Names = npt.NDArray[np.str_]
 
@@ -192,7 +198,7 @@ def _corrections(receiver: str, corrections: Columns, name: str) -> list[Panel]:
         if not np.nan_to_num(values).any():
             continue
         curves = [
-            _thinned(broken(_of_satellite(satellite, times[of], values[of], Shape.LINE)))
+            thinned(broken(_of_satellite(satellite, times[of], values[of], Shape.LINE)), _BINS)
             for satellite, of in first.items()
         ]
         panels += panel(
@@ -200,8 +206,3 @@ def _corrections(receiver: str, corrections: Columns, name: str) -> list[Panel]:
             f"{name}{title}", unit, curves, row=f"{receiver} {row}",
         )  # fmt: skip
     return panels
-
-
-def _thinned(curve: Curve) -> Curve:
-    rows = line_rows(curve.values, _BINS)
-    return dataclasses.replace(curve, times_ns=curve.times_ns[rows], values=curve.values[rows])

@@ -94,7 +94,7 @@ class Sink:
         """
         for curve in panel.curves:
             path = f"{root}/{panel.key}/{curve.key}"
-            self.scalars(path, curve.times_ns, curve.values)
+            self.scalars(path, curve.times_ns, panel.linear(curve.values))
             self.static(path, _style(curve))
             if curve.outage_red:
                 self._again_in_outages(path, curve, inside(curve.times_ns, outages))

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from rich.console import Console
 
-from tools.bench import formats, gnss, network, replaying, simulator
+from tools.bench import formats, gnss, network, ppp, ppp_ins, replaying, simulator, smoother
 from tools.bench.row import Row, summary
 
 BENCHES: dict[str, Callable[..., list[Row]]] = {
@@ -25,7 +25,10 @@ BENCHES: dict[str, Callable[..., list[Row]]] = {
     "diff": formats.bench_diff,
     "gnss": gnss.bench_gnss,
     "network": network.bench_network,
+    "ppp": ppp.bench_ppp,
+    "ppp-ins": ppp_ins.bench_ppp_ins,
     "simulator": simulator.bench_simulator,
+    "smoother": smoother.bench_smoother,
     "importers": formats.bench_importers,
     "elementary": formats.bench_elementary,
 }
