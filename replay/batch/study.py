@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from replay.batch.workers import Workers
 from replay.configuration import parse_assignments
@@ -22,6 +22,9 @@ from replay.engine.run import replay_log
 from replay.errors import UsageError
 from replay.log.reader import LogReader
 from replay.simulate import simulate
+
+if TYPE_CHECKING:
+    from replay.batch.sweep_study import SweepStudy
 
 INPUT: Final = "input"
 
@@ -137,6 +140,8 @@ class Options:
         Processes.
     keep_logs : bool
         Whether the logs of the first seed stay; those of further seeds never do.
+    scheduler : str
+        Address of a running Dask scheduler, for a study that is a sweep; empty for none.
     """
 
     folder: Path
@@ -144,6 +149,7 @@ class Options:
     labels: tuple[str, ...] = ()
     jobs: int = 2
     keep_logs: bool = True
+    scheduler: str = ""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -364,7 +370,7 @@ def discard_logs(logs: Mapping[str, Path]) -> None:
                 empty.rmdir()
 
 
-def find_study(name: str) -> Study:
+def find_study(name: str) -> Study | SweepStudy:
     """Study of a name.
 
     Raises
@@ -389,8 +395,15 @@ def _lee2010_degradation() -> Study:
     return STUDY
 
 
-STUDIES: Final[dict[str, Callable[[], Study]]] = {
+def _kan2022() -> SweepStudy:
+    from replay.batch.kan2022.run import STUDY
+
+    return STUDY
+
+
+STUDIES: Final[dict[str, Callable[[], Study | SweepStudy]]] = {
     "lee2010": _lee2010,
     "lee2010-degradation": _lee2010_degradation,
+    "kan2022": _kan2022,
 }
 """Studies by name; each is imported when it is asked for."""

@@ -312,3 +312,21 @@ def test_processes_give_the_same_rows(file: Path) -> None:
 def test_no_scheduler(file: Path) -> None:
     with pytest.raises(UsageError, match="no Dask scheduler"):
         swept(file, scheduler="tcp://127.0.0.1:1", patience_s=0.2)
+
+
+def test_a_pipeline_goes_over_the_log_of_the_one_before(file: Path) -> None:
+    file.write_text(SWEEP.replace("[grid]", 'then = ["gnss-ins-lc"]\n[grid]').replace(
+        '[50, 10]', '[50]').replace('["", "25,5"]', '[""]'))  # fmt: skip
+    (case,) = cases(file)
+    assert case.then == ("gnss-ins-lc",)
+    swept(file)
+    (after,) = rows_of(file)
+    assert after["error"] == ""
+    file.write_text(SWEEP.replace("[50, 10]", "[50]").replace('["", "25,5"]', '[""]'))
+    (before,) = cases(file)
+    assert before.key != case.key
+    # The same pipeline over the same samples, under another name.
+    log = file.parent / "a.mcap"
+    simulate(file.parent / "scenario.toml", log)
+    row = run_case(before, (log, 0.0, ""))
+    assert after[RMS] == row[RMS]

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from replay.batch.sweep.file import Case, Source
-from replay.batch.sweep.rows import ERROR, FIGURE, GRID, Row, flatten
+from replay.batch.sweep.measure import find_measure
+from replay.batch.sweep.rows import ERROR, FIGURE, GRID, SERIES, Row, flatten
 from replay.configuration import build, parse_assignments, to_toml
 from replay.engine.job import make_job
 from replay.engine.manifest import package_version
@@ -48,6 +49,7 @@ def run_case(case: Case, made: tuple[Path, float, str]) -> Row:
         "source": case.source.name,
         "source_digest": case.source.digest,
         "pipeline": case.pipeline,
+        "then": json.dumps(list(case.then)),
         "settings": json.dumps(list(case.settings)),
         **{f"{GRID}{name}": value for name, value in case.grid.items()},
         "transform": "",
@@ -95,15 +97,29 @@ def _fill(row: Row, case: Case, log: Path, scratch: Path) -> None:
         result = replay_log(reader, run, job)
     row["configuration"] = job.text()
     row["inputs"] = _digests(result.inputs)
-    row["outputs"] = _digests(result.outputs)
     losses += [str(loss) for loss in result.losses.losses]
+    for number, pipeline in enumerate(case.then):
+        after = scratch / f"then{number}.mcap"
+        with LogReader(run) as reader:
+            # By its name it is told from the run before, which stays in the log.
+            job = make_job(reader, pipeline, tables=[{"name": f"{pipeline}-after"}])
+            result = replay_log(reader, after, job)
+        losses += [str(loss) for loss in result.losses.losses]
+        run.unlink()
+        run = after
+    row["outputs"] = _digests(result.outputs)
     row["losses"] = json.dumps(losses)
     row["run_s"] = time.monotonic() - begin
     begin = time.monotonic()
-    evaluation = evaluate_run(run, fixed_truth_only=case.fixed_truth_only).to_json_dict()
-    for name, value in flatten(evaluation):
-        if not case.figures or any(fnmatch.fnmatchcase(name, p) for p in case.figures):
-            row[f"{FIGURE}{name}"] = value
+    if case.measure:
+        measured = find_measure(case.measure)(run)
+        row |= {f"{FIGURE}{name}": value for name, value in measured.figures.items()}
+        row |= {f"{SERIES}{name}": values for name, values in measured.series.items()}
+    else:
+        evaluation = evaluate_run(run, fixed_truth_only=case.fixed_truth_only).to_json_dict()
+        for name, value in flatten(evaluation):
+            if not case.figures or any(fnmatch.fnmatchcase(name, p) for p in case.figures):
+                row[f"{FIGURE}{name}"] = value
     row["evaluate_s"] = time.monotonic() - begin
 
 

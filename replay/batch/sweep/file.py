@@ -40,8 +40,11 @@ class SweepFile(Section, frozen=True):
     transform : dict
         Of :class:`replay.engine.transforms.Transform`, for every case.
     pipeline : tuple of str
+    then : tuple of str
+        Pipelines that go over each run's log after it, one over the other's, as `smooth`;
+        what is measured is the last.
     settings : tuple of str
-        `section.key=value`, for every case.
+        `section.key=value`, for every case; of the first pipeline.
     grid : dict of str to list
         Every combination of values is a case. A key is one of a transform (`imu_rate`),
         `scenario.KEY` (`scenario.imu.grade`), `settings.KEY` (`settings.filter.states`), or
@@ -61,6 +64,7 @@ class SweepFile(Section, frozen=True):
     over: dict[str, Any] = msgspec.field(default_factory=dict)
     transform: dict[str, Any] = msgspec.field(default_factory=dict)
     pipeline: tuple[str, ...] = ()
+    then: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
     grid: dict[str, list[Any]] = msgspec.field(default_factory=dict)
     figures: tuple[str, ...] = ()
@@ -113,6 +117,11 @@ class Case:
     settings : tuple of str
     figures : tuple of str
     fixed_truth_only : bool
+    then : tuple of str
+        Pipelines over the run's log.
+    measure : str
+        `module:function` that measures the last log: see :mod:`replay.batch.sweep.measure`;
+        empty for figures of the evaluation.
     """
 
     key: str
@@ -124,6 +133,8 @@ class Case:
     settings: tuple[str, ...]
     figures: tuple[str, ...]
     fixed_truth_only: bool
+    then: tuple[str, ...] = ()
+    measure: str = ""
 
     @property
     def label(self) -> str:
@@ -169,7 +180,7 @@ def _check(sweep: SweepFile) -> None:
         )
     if not sweep.pipeline:
         raise ConfigurationError("a sweep needs pipelines", mend='write pipeline = ["gnss-ins-lc"]')
-    for name in sweep.pipeline:
+    for name in (*sweep.pipeline, *sweep.then):
         find_pipeline(name)
     for key, values in sweep.grid.items():
         if not values:
@@ -193,7 +204,7 @@ def _check(sweep: SweepFile) -> None:
 _TRANSFORM_KEYS: Final = Transform.__struct_fields__
 
 
-def cases_of(sweep: SweepFile, folder: Path) -> tuple[Case, ...]:
+def cases_of(sweep: SweepFile, folder: Path, *, measure: str = "") -> tuple[Case, ...]:
     """Every combination, inputs and pipelines first, the grid's last key the fastest.
 
     Parameters
@@ -201,6 +212,8 @@ def cases_of(sweep: SweepFile, folder: Path) -> tuple[Case, ...]:
     sweep : SweepFile
     folder : Path
         What its paths are relative to.
+    measure : str
+        As :class:`Case` has it.
 
     Raises
     ------
@@ -214,7 +227,7 @@ def cases_of(sweep: SweepFile, folder: Path) -> tuple[Case, ...]:
     for (path, simulated), pipeline in itertools.product(inputs, sweep.pipeline):
         for values in itertools.product(*sweep.grid.values()):
             point = dict(zip(sweep.grid, values, strict=True))
-            cases.append(_case(sweep, path, simulated, pipeline, point, sources))
+            cases.append(_case(sweep, path, simulated, pipeline, point, sources, measure))
     return tuple(cases)
 
 
@@ -225,6 +238,7 @@ def _case(
     pipeline: str,
     point: Mapping[str, Any],
     sources: dict[str, Source],
+    measure: str,
 ) -> Case:
     over: Table = {}
     merge(over, sweep.over)
@@ -252,6 +266,10 @@ def _case(
         "fixed_truth_only": sweep.fixed_truth_only,
         "package": package_version(),
     }
+    if sweep.then:
+        decides["then"] = sweep.then
+    if measure:
+        decides["measure"] = measure
     return Case(
         _digest(decides),
         sweep.name,
@@ -262,6 +280,8 @@ def _case(
         tuple(settings),
         sweep.figures,
         sweep.fixed_truth_only,
+        sweep.then,
+        measure,
     )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -17,6 +19,7 @@ Row = dict[str, Any]
 
 FIGURE: Final = "figure."
 GRID: Final = "grid."
+SERIES: Final = "series."
 ERROR: Final = "error"
 _SUFFIX: Final = ".parquet"
 
@@ -56,7 +59,7 @@ def row_files(folder: Path) -> list[Path]:
 
 
 def read_rows(folder: Path) -> pa.Table:
-    """All rows of a sweep; a figure that a row lacks is null.
+    """All rows of a sweep without their series; a figure that a row lacks is null.
 
     Raises
     ------
@@ -66,7 +69,9 @@ def read_rows(folder: Path) -> pa.Table:
     tables = []
     for path in row_files(folder):
         try:
-            tables.append(pq.read_table(path, partitioning=None))
+            names = pq.read_schema(path).names
+            wanted = [name for name in names if not name.startswith(SERIES)]
+            tables.append(pq.read_table(path, columns=wanted, partitioning=None))
         except (OSError, pa.ArrowException) as error:
             raise LogError(
                 f"a row cannot be read: {error}",
@@ -74,6 +79,27 @@ def read_rows(folder: Path) -> pa.Table:
                 mend="remove the file and go on with --resume",
             ) from error
     return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
+
+
+def read_series(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """Series of one row, each an array, by its name without the prefix.
+
+    Raises
+    ------
+    LogError
+        Where the file is no Parquet.
+    """
+    try:
+        names = [name for name in pq.read_schema(path).names if name.startswith(SERIES)]
+        table = pq.read_table(path, columns=names, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise LogError(
+            f"a row cannot be read: {error}", where=str(path), mend="remove the file and run again"
+        ) from error
+    return {
+        name.removeprefix(SERIES): np.asarray(table.column(name)[0].values.to_numpy())
+        for name in names
+    }
 
 
 def _quoted(text: str) -> str:

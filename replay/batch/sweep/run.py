@@ -7,6 +7,7 @@ import dataclasses
 import logging
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -67,6 +68,8 @@ class Options:
         Address of a running scheduler, whose workers see the same files; empty for none.
     resume : bool
         Leave cases alone that have a row.
+    retry : bool
+        With `resume`: run those again whose row is an error.
     threads : bool
         Workers of an own cluster are threads of this process.
     patience_s : float, s
@@ -77,6 +80,7 @@ class Options:
     jobs: int = 2
     scheduler: str = ""
     resume: bool = False
+    retry: bool = False
     threads: bool = False
     patience_s: float = 10.0
 
@@ -97,18 +101,26 @@ def pending_cases(cases: Sequence[Case], options: Options) -> list[Case]:
             where=str(options.folder),
             mend="say --resume to go on with it, or take another folder",
         )
-    return [case for case in cases if not row_path(options.folder, case).exists()]
+    failed: set[str] = set()
+    if options.retry:
+        rows = read_rows(options.folder)
+        if rows.num_rows:
+            found = rows.select(["case", ERROR]).to_pylist()
+            failed = {row["case"] for row in found if row[ERROR]}
+    return [
+        case for case in cases if case.key in failed or not row_path(options.folder, case).exists()
+    ]
 
 
 def run_sweep(
-    file: Path, cases: Sequence[Case], options: Options, *, told: Told | None = None
+    file: Path | None, cases: Sequence[Case], options: Options, *, told: Told | None = None
 ) -> Swept:
-    """Run those of the cases of a sweep file that have no row yet.
+    """Run those of the cases of a sweep that have no row yet.
 
     Parameters
     ----------
-    file : Path
-        Copied beside the rows.
+    file : Path or None
+        Copied beside the rows; None where the cases are those of no one file.
     cases : sequence of Case
         Of :func:`replay.batch.sweep.file.cases_of`.
     options : Options
@@ -122,7 +134,7 @@ def run_sweep(
     pending = pending_cases(cases, options)
     folder = options.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    if (folder / COPY).resolve() != file.resolve():
+    if file is not None and (folder / COPY).resolve() != file.resolve():
         shutil.copyfile(file, folder / COPY)
     with _inputs(folder / _INPUTS) as inputs:
         for case, row in _rows(pending, inputs, options):
@@ -133,7 +145,8 @@ def run_sweep(
 
 
 def _swept(cases: Sequence[Case], done: int, folder: Path) -> Swept:
-    rows = read_rows(folder).select(["case", ERROR, "losses"]).to_pylist()
+    table = read_rows(folder)
+    rows = table.select(["case", ERROR, "losses"]).to_pylist() if table.num_rows else []
     keys = {case.key for case in cases}
     own = [row for row in rows if row["case"] in keys]
     return Swept(
@@ -168,10 +181,25 @@ def _rows(cases: Sequence[Case], inputs: Path, options: Options) -> Iterator[tup
 
 def _here(cases: Sequence[Case], inputs: Path) -> Iterator[tuple[Case, Row]]:
     made: dict[str, tuple[Path, float, str]] = {}
+    left = _Left(cases)
     for case in cases:
         if case.source.digest not in made:
             made[case.source.digest] = make_input(case.source, inputs)
-        yield case, run_case(case, made[case.source.digest])
+        row = run_case(case, made[case.source.digest])
+        left.done(case, made[case.source.digest][0])
+        yield case, row
+
+
+class _Left:
+    """Removes a simulated log once its last case is done: many of them are larger than rows."""
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        self._counts = Counter(case.source.digest for case in cases)
+
+    def done(self, case: Case, log: Path) -> None:
+        self._counts[case.source.digest] -= 1
+        if case.source.simulated and self._counts[case.source.digest] == 0:
+            log.unlink(missing_ok=True)
 
 
 def _on_workers(client: Any, cases: Sequence[Case], inputs: Path) -> Iterator[tuple[Case, Row]]:
@@ -189,10 +217,15 @@ def _on_workers(client: Any, cases: Sequence[Case], inputs: Path) -> Iterator[tu
         client.submit(run_case, case, made[case.source.digest], pure=False, priority=-place): case
         for place, case in enumerate(cases)
     }
+    left = _Left(cases)
     for task in library.as_completed(list(tasks)):
         case = tasks[task]
         error = task.exception()
-        yield case, task.result() if error is None else failed_row(case, error)
+        row = task.result() if error is None else failed_row(case, error)
+        log = made[case.source.digest]
+        if log.status == "finished":
+            left.done(case, log.result()[0])
+        yield case, row
 
 
 @contextlib.contextmanager

@@ -74,9 +74,9 @@ def pivot(folder: Path) -> Pivot:
         raise UsageError(
             "the folder has no rows of a sweep", where=str(folder), mend="run `replay sweep` first"
         )
-    sweep = load_sweep(folder / COPY)
+    sweep = load_sweep(folder / COPY) if (folder / COPY).exists() else _found(rows)
     grid = [f"{GRID}{key}" for key in sweep.grid if key != SEED]
-    keys = [key for key in ("source", "pipeline") if len({row[key] for row in rows}) > 1]
+    keys = [key for key in ("sweep", "source", "pipeline") if len({row[key] for row in rows}) > 1]
     keys += [key for key in grid if any(row.get(key) is not None for row in rows)]
     figures = _figures(sweep, rows)
     groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
@@ -90,6 +90,16 @@ def pivot(folder: Path) -> Pivot:
     )
 
 
+def _found(rows: Sequence[Mapping[str, Any]]) -> SweepFile:
+    """A sweep with the grid that rows of no one file have, values in their order."""
+    grid: dict[str, list[Any]] = {}
+    for name in rows[0]:
+        if name.startswith(GRID):
+            values = {row[name] for row in rows if row[name] is not None}
+            grid[name.removeprefix(GRID)] = sorted(values, key=lambda v: (isinstance(v, str), v))
+    return SweepFile(name=", ".join(dict.fromkeys(row["sweep"] for row in rows)), grid=grid)
+
+
 def _place(sweep: SweepFile, row: Mapping[str, Any]) -> tuple[Any, ...]:
     """Where a row stands: values in the order of the file, those of another one last."""
     places = []
@@ -97,7 +107,7 @@ def _place(sweep: SweepFile, row: Mapping[str, Any]) -> tuple[Any, ...]:
         labels = [label_of(value) for value in values]
         value = row.get(f"{GRID}{key}")
         places.append(labels.index(value) if value in labels else len(labels))
-    return row["source"], row["pipeline"], *places
+    return row["sweep"], row["source"], row["pipeline"], *places
 
 
 def _figures(sweep: SweepFile, rows: Sequence[Mapping[str, Any]]) -> list[str]:
