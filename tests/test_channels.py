@@ -17,6 +17,7 @@ from replay.stages.gnss_ins_lc import GnssInsLoose
 
 NAMES = {
     "receiver": "r1",
+    "unit": "u1",
     "rover": "rover",
     "run": "gnss-ins-lc",
     "network": "n1",

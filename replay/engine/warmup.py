@@ -15,6 +15,7 @@ from replay.channels import (
     GNSS_OBS,
     IMU,
     NAV,
+    PRECISE_ORBIT,
     RECEIVER,
     SOLUTION,
     ChannelSpec,
@@ -63,6 +64,7 @@ def _write_small_log(path: Path) -> None:
         IMU.topic: (IMU, _inertial(times)),
         GNSS_FIX.at(receiver="rover"): (GNSS_FIX, _fixes(times)),
         NAV.topic: (NAV, _messages()),
+        PRECISE_ORBIT.topic: (PRECISE_ORBIT, _orbits()),
     }
     for receiver in ("rover", "base", "station"):
         rows[GNSS_OBS.at(receiver=receiver)] = (GNSS_OBS, _observations(times))
@@ -145,6 +147,23 @@ def _messages() -> Columns:
     record["prn"] = 1
     record["sqrt_a"] = 5153.7
     return ephemeris_columns(record, np.zeros(1, dtype=np.int64))
+
+
+def _orbits() -> Columns:
+    """The same satellite in a product: too few epochs for an orbit."""
+    no = np.zeros(1, dtype=np.bool_)
+    return Columns.build(
+        np.zeros(1, dtype=np.int64),
+        {
+            "satellite": np.full(1, b"G01"),
+            "position_ecef_m": np.array([[26.6e6, 0.0, 0.0]]),
+            "velocity_ecef_m_s": np.zeros((1, 3)),
+            "clock_s": np.zeros(1),
+            "position_std_ecef_m": np.zeros((1, 3)),
+            "clock_std_s": np.zeros(1),
+            **dict.fromkeys(("orbit_predicted", "manoeuvre", "clock_predicted", "clock_event"), no),
+        },
+    )
 
 
 def _observations(times: np.ndarray) -> Columns:
