@@ -11,30 +11,27 @@ slot has the wavelength of the narrow lane, and is searched for.
 import numpy as np
 from numba import njit
 
-from replay.kernels.ambiguity import COUNT_LIMIT, OK, bootstrapped_success
-from replay.kernels.ambiguity_search import resolve as resolve_integers
-from replay.kernels.ambiguity_search import resolve_partial, w_ratio
+from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import GLONASS, SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.ppp_lanes import find_lanes, fix_lanes, integers_of, keep_known
 from replay.kernels.ppp_records import HOLD, PHASE
 from replay.kernels.rtk_output import write_ambiguities, write_resolution
-from replay.kernels.rtk_records import PARTIAL_NONE, PARTIAL_SUCCESS, TEST_W_RATIO
+from replay.kernels.rtk_records import PARTIAL_NONE
 from replay.kernels.rtk_resolve import (
-    condition,
+    clear_attempt,
     difference_floats,
     hold,
     keep_integers,
     same_integers,
+    search_integers,
 )
 from replay.kernels.types import Array, Record
 
 # Cycles: a phase whose own deviation is more tells no integer.
 _BLUR = 0.25
 _APART_SIGMAS = 4.0
-_NODES = 20_000
-_LARGEST_RATIO = 9999.9
 
 
 @njit(cache=True)
@@ -135,17 +132,6 @@ def find_candidates(
 
 
 @njit(cache=True)
-def _clear(out: Record, count: int) -> None:
-    out["count"] = count
-    out["fixed"] = 0
-    out["passed"] = 0
-    out["whole"] = 0
-    out["ratio"] = 0.0
-    out["w_ratio"] = 0.0
-    out["success"] = 0.0
-
-
-@njit(cache=True)
 def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out: Record) -> int:
     """Round the wide lanes, search for the integers of the first slot, and test the best ones.
 
@@ -165,7 +151,7 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
     int
         Candidates that are left.
     """
-    _clear(out, count)
+    clear_attempt(out, count)
     if count == 0:
         return 0
     a, Q, Qx = np.empty(count), np.empty((count, count)), np.empty((3, count))
@@ -204,65 +190,12 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
         for c in range(3):
             Rx[c, i] = Qx[c, chosen[i]]
     integers = np.zeros(first, dtype=np.int64)
-    _search_first(b, R, Rx, place, cov, cfg, integers, out)
+    search_integers(b, R, Rx, place, cov, cfg, integers, out)
     if out["whole"] == 1:
         integers_of(candidates, kept, places, lower, lanes, integers)
     if out["passed"] == 1:
         out["fixed"] += kept - first
     return kept
-
-
-@njit(cache=True)
-def _search_first(
-    a: Array, Q: Array, Qx: Array, x: Array, P: Array, cfg: Record, integers: Array, out: Record
-) -> None:
-    """Search for the integers of the first slot given the lanes, and test them."""
-    count = a.shape[0]
-    fixed, norms = np.zeros((2, count), dtype=np.int64), np.zeros(2)
-    L, D = np.zeros((count, count)), np.zeros(count)
-    Zt = np.zeros((count, count), dtype=np.int64)
-    inverse = np.zeros((count, count), dtype=np.int64)
-    first = 0
-    if cfg["partial"] == PARTIAL_SUCCESS:
-        conditional, covariance = np.zeros(count), np.zeros((count, count))
-        status, first, separation = resolve_partial(
-            a, Q, cfg["success"], _NODES, fixed, norms, conditional, covariance, L, D, Zt, inverse
-        )
-    else:
-        status, separation = resolve_integers(a, Q, _NODES, fixed, norms, L, D, Zt, inverse)
-    if status != OK:
-        return
-    out["ratio"] = _LARGEST_RATIO
-    if norms[0] * _LARGEST_RATIO > norms[1]:
-        out["ratio"] = norms[1] / norms[0]
-    out["w_ratio"] = w_ratio(norms[0], norms[1], separation)
-    out["success"] = bootstrapped_success(D, first)
-    statistic = out["w_ratio"] if cfg["test"] == TEST_W_RATIO else out["ratio"]
-    sure = statistic >= cfg["threshold"] and out["success"] >= cfg["success"]
-    miss = np.zeros(count)
-    for k in range(first, count):
-        for i in range(count):
-            miss[k] += Zt[k, i] * a[i]
-        if cfg["partial"] == PARTIAL_SUCCESS:
-            # Candidates of a partial search are combinations already.
-            miss[k] -= fixed[0, k]
-        else:
-            whole = 0
-            for i in range(count):
-                whole += Zt[k, i] * fixed[0, i]
-            miss[k] -= whole
-    condition(miss, Qx, L, D, Zt, first, x, P, out)
-    if first == 0:
-        out["whole"] = 1
-        for i in range(count):
-            integers[i] = fixed[0, i]
-            if cfg["partial"] == PARTIAL_SUCCESS:
-                integers[i] = 0
-                for k in range(count):
-                    integers[i] += fixed[0, k] * inverse[k, i]
-    if sure and count - first >= cfg["least"]:
-        out["passed"] = 1
-        out["fixed"] = count - first
 
 
 @njit(cache=True)

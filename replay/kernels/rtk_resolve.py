@@ -188,6 +188,18 @@ def condition(
 
 
 @njit(cache=True)
+def clear_attempt(out: Record, count: int) -> None:
+    """An attempt at so many candidates that has found nothing."""
+    out["count"] = count
+    out["fixed"] = 0
+    out["passed"] = 0
+    out["whole"] = 0
+    out["ratio"] = 0.0
+    out["w_ratio"] = 0.0
+    out["success"] = 0.0
+
+
+@njit(cache=True)
 def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out: Record) -> None:
     """Search for the integers of some candidates and test the best ones.
 
@@ -202,17 +214,38 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
     out : record of ATTEMPT_DTYPE
         Filled.
     """
-    out["count"] = count
-    out["fixed"] = 0
-    out["passed"] = 0
-    out["whole"] = 0
-    out["ratio"] = 0.0
-    out["w_ratio"] = 0.0
-    out["success"] = 0.0
+    clear_attempt(out, count)
     if count < cfg["least"] or count == 0:
         return
     a, Q, Qx = np.empty(count), np.empty((count, count)), np.empty((3, count))
     difference_floats(candidates, count, x, P, a, Q, Qx)
+    integers = np.zeros(count, dtype=np.int64)
+    search_integers(a, Q, Qx, x, P, cfg, integers, out)
+    if out["whole"] == 1:
+        for i in range(count):
+            candidates[i]["integer"] = integers[i]
+
+
+@njit(cache=True)
+def search_integers(
+    a: Array, Q: Array, Qx: Array, x: Array, P: Array, cfg: Record, integers: Array, out: Record
+) -> None:
+    """Search for the integers of float ambiguities, test the best ones, give the position then.
+
+    Parameters
+    ----------
+    a, Q, Qx : float64 arrays (n,), (n, n), (3, n)
+        Ambiguities (cycle), their covariance, that of the position with them (m cycle).
+    x, P
+        Float states and covariance; the position comes first.
+    cfg : record
+        With `partial`, `success`, `test`, `threshold` and `least` of RTK_CONFIG_DTYPE.
+    integers : int64 array (n,)
+        Filled where all are known (`whole`).
+    out : record of ATTEMPT_DTYPE
+        Cleared by :func:`clear_attempt`; filled.
+    """
+    count = a.shape[0]
     fixed, norms = np.zeros((2, count), dtype=np.int64), np.zeros(2)
     L, D = np.zeros((count, count)), np.zeros(count)
     Zt = np.zeros((count, count), dtype=np.int64)
@@ -233,10 +266,7 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
     out["w_ratio"] = w_ratio(norms[0], norms[1], separation)
     out["success"] = bootstrapped_success(D, first)
     statistic = out["w_ratio"] if cfg["test"] == TEST_W_RATIO else out["ratio"]
-    if not statistic >= cfg["threshold"] or not out["success"] >= cfg["success"]:
-        passed = False
-    else:
-        passed = count - first >= cfg["least"]
+    sure = statistic >= cfg["threshold"] and out["success"] >= cfg["success"]
     miss = np.zeros(count)
     for k in range(first, count):
         total = 0.0
@@ -259,9 +289,10 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
                 value = 0
                 for k in range(count):
                     value += fixed[0, k] * inverse[k, i]
-            candidates[i]["integer"] = value
-    out["fixed"] = count - first if passed else 0
-    out["passed"] = 1 if passed else 0
+            integers[i] = value
+    if sure and count - first >= cfg["least"]:
+        out["passed"] = 1
+        out["fixed"] = count - first
 
 
 @njit(cache=True)

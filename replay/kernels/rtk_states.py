@@ -66,6 +66,18 @@ def heed_breaks(rows: Array, end: int, s: Record) -> None:
 
 
 @njit(cache=True)
+def heed_late(rows: Array, q: Record) -> None:
+    """Remember breaks that the rover told in an epoch that comes after newer ones.
+
+    They are true of the phases since; its lock times and open half cycles are past.
+    """
+    for k in range(rows.shape[0]):
+        for slot in range(SLOTS):
+            if rows[k]["lock_lost"][slot] & _LOST:
+                q["slip"][rows[k]["satellite"], slot] = 1
+
+
+@njit(cache=True)
 def compare_frequencies(
     rover: Array, base: Array, pairs: Array, count: int, t: int, s: Record, cfg: Record
 ) -> None:

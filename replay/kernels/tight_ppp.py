@@ -33,7 +33,7 @@ from replay.kernels.records import (
     STATUS_OUTAGE,
 )
 from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE
-from replay.kernels.rtk_states import heed_breaks
+from replay.kernels.rtk_states import heed_breaks, heed_late
 from replay.kernels.single_point import true_time
 from replay.kernels.tight import (
     ALIGNING,
@@ -58,7 +58,6 @@ from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event, state_count
 
 _LEAST_PHASES: Final = 4
-_LOST: Final = 1
 _SET_ANEW_M: Final = 3000.0
 
 
@@ -76,15 +75,6 @@ def epoch_time(s: Record, g: Record, q: Record, epoch: Record) -> int:
     if set_anew and abs(epoch["clock"] - expected) > _SET_ANEW_M:
         return true_time(epoch["t"], epoch["clock"])
     return true_time(epoch["t"], expected)
-
-
-@njit(cache=True)
-def heed_late(rows: Array, q: Record) -> None:
-    """Remember breaks that the receiver told in an epoch that comes after newer ones."""
-    for k in range(rows.shape[0]):
-        for slot in range(SLOTS):
-            if rows[k]["lock_lost"][slot] & _LOST:
-                q["slip"][rows[k]["satellite"], slot] = 1
 
 
 @njit(cache=True)

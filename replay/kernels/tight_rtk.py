@@ -59,7 +59,13 @@ from replay.kernels.rtk_records import (
     ROOM,
 )
 from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE, resolve_epoch
-from replay.kernels.rtk_states import compare_frequencies, heed_breaks, name_states, predict
+from replay.kernels.rtk_states import (
+    compare_frequencies,
+    heed_breaks,
+    heed_late,
+    name_states,
+    predict,
+)
 from replay.kernels.single_point import SINGLE_STATE_DTYPE, true_time
 from replay.kernels.tight import ALIGNING, SKIPPED, begin_sample, end_sample, single_fix
 from replay.kernels.tight_update import antenna
@@ -78,7 +84,6 @@ LEAD: Final = 3
 RTK_TIGHT_STATES: Final = MAX_STATES + ROOM - LEAD
 """Error states at most: those of the inertial system, and of the differences all but position."""
 _LEAST_DIFFERENCES: Final = 4
-_LOST: Final = 1
 _NAN = float("nan")
 
 
@@ -461,18 +466,6 @@ def show_fixed(
 
 
 @njit(cache=True)
-def _heed_late(rows: Array, q: Record) -> None:
-    """Remember breaks that the rover told in an epoch that comes after newer ones.
-
-    They are true of the phases since; its lock times and open half cycles are past.
-    """
-    for k in range(rows.shape[0]):
-        for slot in range(SLOTS):
-            if rows[k]["lock_lost"][slot] & _LOST:
-                q["slip"][rows[k]["satellite"], slot] = 1
-
-
-@njit(cache=True)
 def _take_epochs(
     s: Record, q: Record, cfg: Record, tcfg: Record, rcfg: Record, work: Record, solve: Record,
     epochs: Array, rows: Array, base_epochs: Array, base_rows: Array, partner: Array,
@@ -510,7 +503,7 @@ def _take_epochs(
             heed_breaks(part, 0, q)
             continue
         elif at < s["t"]:
-            _heed_late(part, q)
+            heed_late(part, q)
             late = (s["t"] - at) * 1e-9
             record_event(events, counts, epoch["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
             continue
