@@ -10,6 +10,7 @@ from rich.table import Table
 
 from replay.cli.app import app, leave, out, say, warn
 from replay.cli.runs import ShowProgress, progress_bar
+from replay.cli.sweeps import warn_outdated
 from replay.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -113,6 +114,7 @@ def _run_sweep(found: SweepStudy, options: Options, progress: bool | None) -> Ex
     say(f"rows: {rows_folder(options)}")
     for what, path in files.items():
         say(f"{what}: {path}")
+    warn_outdated(swept.outdated)
     if swept.failed:
         warn(f"loss: {swept.failed} runs failed; the same command tries them again")
     if swept.lossy:

@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from replay.batch.sweep.file import Case
 
 
+def warn_outdated(rows: int) -> None:
+    """Say that rows are of other code than this, where some are."""
+    if rows:
+        warn(
+            f"note: {rows} rows were made by another state of this program;"
+            " remove their files to have them made anew"
+        )
+
+
 @app.command()
 def sweep(
     file: Annotated[
@@ -70,6 +79,7 @@ def sweep(
     say(f"{swept.done} cases run now, rows in {output}")
     if swept.foreign:
         warn(f"note: {swept.foreign} rows belong to no case of this sweep as it is now")
+    warn_outdated(swept.outdated)
     if swept.failed:
         warn(f"loss: {swept.failed} cases failed; without its row's file --resume runs one again")
     if swept.lossy:

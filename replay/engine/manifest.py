@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import importlib.metadata
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from google.protobuf import json_format
@@ -15,11 +18,23 @@ from replay.schemas import replay_pb2
 MANIFEST: Final = "replay.manifest"
 DEFAULTS: Final = "replay.defaults"
 _JSON: Final = "json"
+_CODE_DIGITS: Final = 16
 
 
 def package_version() -> str:
     """Version of this package."""
     return importlib.metadata.version("gnss-ins-replay")
+
+
+@functools.cache
+def code_digest() -> str:
+    """Digest of this package's modules, in hex: between versions the code moves on too."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:_CODE_DIGITS]
 
 
 def digest_messages(digests: Mapping[str, ChannelDigest]) -> list[replay_pb2.ChannelDigest]:

@@ -258,6 +258,14 @@ def test_the_claim_follows_the_drifts(slower_by_cm: float, says: str) -> None:
     assert says in claim_said(runs, "unit")
     assert found[0].pair.mean == pytest.approx(-slower_by_cm, abs=1.0)
     assert all(item.adjusted >= item.pair.probability for item in found)
+    said = claim_said(runs, "unit")
+    if slower_by_cm:  # all three are shown to differ: nothing is left to be bounded
+        assert "lies within" not in said
+        assert f"(by {abs(found[0].pair.mean):.1f} cm)" in said
+    else:
+        assert said.count("of 100 Hz lies within") == 2
+        widest = max(abs(found[0].pair.low), abs(found[0].pair.high))
+        assert f"within {widest:.1f} cm of nought" in said
     assert "One seed tells nothing" in claim_said(all_runs(1), "unit")
 
 

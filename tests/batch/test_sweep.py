@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import distributed
 import pyarrow.dataset
 import pytest
 
@@ -307,6 +308,40 @@ def test_processes_give_the_same_rows(file: Path) -> None:
         path.unlink()
     assert swept(file, jobs=2).done == 4
     assert {row["case"]: (row["outputs"], row[RMS]) for row in rows_of(file)} == alone
+
+
+def test_a_running_scheduler_gives_the_same_rows(file: Path) -> None:
+    swept(file)
+    alone = {row["case"]: (row["outputs"], row[RMS]) for row in rows_of(file)}
+    for path in row_files(file.parent / "out"):
+        path.unlink()
+    library: Any = distributed
+    with library.LocalCluster(
+        n_workers=1,
+        threads_per_worker=2,
+        processes=False,
+        protocol="tcp",
+        dashboard_address="127.0.0.1:0",
+        memory_limit=0,
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert address.startswith("tcp://")
+        assert swept(file, scheduler=address).done == 4
+        # The cluster is not the sweep's own: it runs on.
+        with library.Client(address) as client:
+            assert client.submit(pow, 3, 4).result() == 81
+    assert {row["case"]: (row["outputs"], row[RMS]) for row in rows_of(file)} == alone
+
+
+def test_rows_of_other_code_are_told(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert swept(file).outdated == 0
+    monkeypatch.setattr("replay.batch.sweep.run.code_digest", lambda: "another")
+    again = swept(file, resume=True)
+    assert (again.done, again.outdated) == (0, 4)
+    row_files(file.parent / "out")[0].unlink()
+    monkeypatch.setattr("replay.batch.sweep.case.code_digest", lambda: "another")
+    again = swept(file, resume=True)
+    assert (again.done, again.outdated) == (1, 3)
 
 
 def test_no_scheduler(file: Path) -> None:

@@ -23,6 +23,7 @@ from replay.batch.kan2022.runs import Kind, Runs, drift_sizes_cm
 _SPATIAL: Final = 3  # column of the drift in space
 _LEVEL: Final = 0.05
 _FEW_SEEDS: Final = 2
+_METRES_FROM_CM: Final = 200.0
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -94,9 +95,11 @@ def claim_said(runs: Runs, grade: str) -> str:
             less = [item for item in own if _less(item)]
             slower[method] = less
             more = [item for item in own if _more(item)]
+            rest = [item for item in own if item not in less and item not in more]
             parts.append(
-                f"With samples {words}, {_rates(less, 'drift less than')}"
-                f" {own[0].second.rate_hz} Hz, {_rates(more, 'drift more')}, {_rest(own)}"
+                f"With samples {words},"
+                f" {_rates(less, f'drift less than {own[0].second.rate_hz} Hz')},"
+                f" {_rates(more, 'drift more')}{_rest(rest)}."
             )
     own = [item for item in found if item.second.rate_hz == item.first.rate_hz]
     more = [item for item in own if _more(item)]
@@ -122,14 +125,26 @@ def _more(item: Comparison) -> bool:
 def _rates(items: list[Comparison], does: str) -> str:
     if not items:
         return f"none of the rates is shown to {does}"
-    return f"{' and '.join(f'{item.first.rate_hz} Hz' for item in items)} {does}"
+    rates = " and ".join(f"{item.first.rate_hz} Hz" for item in items)
+    by = " and ".join(_size(abs(item.pair.mean)) for item in items)
+    return f"{rates} {does} (by {by})"
 
 
 def _rest(items: list[Comparison]) -> str:
     """The widest interval, so that "not shown" is not read as "equal"."""
     bounds = [abs(v) for i in items for v in (i.pair.low, i.pair.high) if math.isfinite(v)]
-    most = max(bounds) if bounds else math.nan
-    return f"and every mean difference lies within {most:.1f} cm of nought (95 %)."
+    if not bounds:
+        return ""
+    whose = " and ".join(f"{item.first.rate_hz} Hz" for item in items)
+    return (
+        f"; the mean difference of {whose} lies within {_size(max(bounds))} of nought (95 %),"
+        " whichever its sign"
+    )
+
+
+def _size(value_cm: float) -> str:
+    """A length as a person takes it in."""
+    return f"{value_cm:.1f} cm" if value_cm < _METRES_FROM_CM else f"{value_cm / 100.0:.1f} m"
 
 
 def _verdict(slower: dict[str, list[Comparison]], *, dropping_harms: bool) -> str:

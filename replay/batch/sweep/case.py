@@ -11,10 +11,10 @@ from pathlib import Path
 
 from replay.batch.sweep.file import Case, Source
 from replay.batch.sweep.measure import find_measure
-from replay.batch.sweep.rows import ERROR, FIGURE, GRID, SERIES, Row, flatten
+from replay.batch.sweep.rows import CODE, ERROR, FIGURE, GRID, SERIES, Row, flatten
 from replay.configuration import build, parse_assignments, to_toml
 from replay.engine.job import make_job
-from replay.engine.manifest import package_version
+from replay.engine.manifest import code_digest, package_version
 from replay.engine.run import replay_log
 from replay.engine.transforms import Transform, transform_log
 from replay.errors import ReplayError
@@ -46,6 +46,7 @@ def run_case(case: Case, made: tuple[Path, float, str]) -> Row:
         "case": case.key,
         "sweep": case.sweep,
         "package": package_version(),
+        CODE: code_digest(),
         "source": case.source.name,
         "source_digest": case.source.digest,
         "pipeline": case.pipeline,

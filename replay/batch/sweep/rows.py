@@ -21,6 +21,7 @@ FIGURE: Final = "figure."
 GRID: Final = "grid."
 SERIES: Final = "series."
 ERROR: Final = "error"
+CODE: Final = "code"
 _SUFFIX: Final = ".parquet"
 
 

@@ -14,7 +14,8 @@ from typing import Any, Final
 
 from replay.batch.sweep.case import failed_row, make_input, run_case
 from replay.batch.sweep.file import Case, Source
-from replay.batch.sweep.rows import ERROR, Row, read_rows, row_files, row_path, write_row
+from replay.batch.sweep.rows import CODE, ERROR, Row, read_rows, row_files, row_path, write_row
+from replay.engine.manifest import code_digest
 from replay.errors import ExitCode, UsageError
 
 COPY: Final = "sweep.toml"
@@ -40,6 +41,8 @@ class Swept:
         Rows of runs that lost something.
     foreign : int
         Rows in the folder that belong to no case of the sweep, as it is now.
+    outdated : int
+        Rows of its cases that another state of the code made.
     """
 
     cases: int
@@ -47,6 +50,7 @@ class Swept:
     failed: int
     lossy: int
     foreign: int
+    outdated: int = 0
 
     @property
     def exit_code(self) -> ExitCode:
@@ -146,7 +150,8 @@ def run_sweep(
 
 def _swept(cases: Sequence[Case], done: int, folder: Path) -> Swept:
     table = read_rows(folder)
-    rows = table.select(["case", ERROR, "losses"]).to_pylist() if table.num_rows else []
+    known = [name for name in ("case", ERROR, CODE, "losses") if name in table.column_names]
+    rows = table.select(known).to_pylist()
     keys = {case.key for case in cases}
     own = [row for row in rows if row["case"] in keys]
     return Swept(
@@ -155,6 +160,7 @@ def _swept(cases: Sequence[Case], done: int, folder: Path) -> Swept:
         failed=sum(bool(row[ERROR]) for row in own),
         lossy=sum(row["losses"] != "[]" for row in own),
         foreign=len(rows) - len(own),
+        outdated=sum(row.get(CODE) != code_digest() for row in own),
     )
 
 
