@@ -11,7 +11,7 @@ from replay import channels, time
 
 
 def event_summary(log: Path) -> Iterator[str]:
-    """A line per kind of event of every run in a log: how many, and the first of them.
+    """A line per kind of event of every run and receiver: how many, and the first of them.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def event_summary(log: Path) -> Iterator[str]:
 
     with LogReader(log) as reader:
         for topic in reader.channels:
-            if not channels.FILTER_EVENTS.matches(topic):
+            if channels.find(topic) not in (channels.FILTER_EVENTS, channels.GNSS_EVENTS):
                 continue
             events = reader.read(topic)
             details = events.ragged("detail").texts()

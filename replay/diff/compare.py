@@ -27,6 +27,7 @@ from replay.channels import (
 )
 from replay.diff.divergence import first_row
 from replay.diff.join import KINDS, Joined, join
+from replay.diff.lineage import lineage
 from replay.diff.result import (
     ChannelDiff,
     ChannelStatus,
@@ -94,7 +95,11 @@ def diff_logs(
 def diff_runs(a: Run, b: Run, options: DiffOptions | None = None) -> DiffResult:
     """Compare two runs, from files or from memory."""
     options = options or DiffOptions()
-    pairs = pair_topics(a.schemas, b.schemas, options.run_names)
+    family = lineage(a.manifest, b.manifest)
+    names = options.run_names
+    if family is not None:
+        names = names or family.run_names
+    pairs = pair_topics(a.schemas, b.schemas, names)
     wanted = _chosen(pairs, options.topics)
     channels = [
         _compare_channel(a, b, topic, other, options)
@@ -108,19 +113,24 @@ def diff_runs(a: Run, b: Run, options: DiffOptions | None = None) -> DiffResult:
             (b, pairs.only_b, ChannelStatus.EXTRA),
         )
         for topic in topics
-        if topic in wanted
+        if topic in wanted and not (family is not None and topic in family.passed)
     ]
     channels.sort(key=lambda channel: (rank(channel.topic), channel.topic))
     manifest_a, manifest_b = a.manifest or Manifest(), b.manifest or Manifest()
     both_manifests = a.manifest is not None and b.manifest is not None
-    inputs = input_changes(manifest_a, manifest_b) if both_manifests else []
-    culprit = _culprit(a, b, [c.topic for c in channels if c.status is not ChannelStatus.IDENTICAL])
+    related = family is not None
+    inputs = input_changes(manifest_a, manifest_b) if both_manifests and not related else []
+    differing = [c.topic for c in channels if c.status is not ChannelStatus.IDENTICAL]
+    # Of runs over runs the stages are other ones: their traces have nothing to part from.
+    culprit = None if related else _culprit(a, b, differing)
     verdict, reasons = judge(
         channels,
         None if options.topics else culprit,
         other_inputs=[change.key for change in inputs],
         allow_different_inputs=options.allow_different_inputs,
     )
+    if family is not None:
+        reasons = [family.text, *reasons]
     return DiffResult(
         verdict=verdict,
         exit_code=int(verdict.exit_code),

@@ -7,6 +7,7 @@ import difflib
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
+from replay.channels import COARSE, CORRECTIONS, SATELLITES, ChannelSpec
 from replay.configuration import Section
 from replay.errors import UsageError
 from replay.stages.base import Stage
@@ -58,6 +59,18 @@ class Pipeline:
 def _gnss_ins_lc() -> Parts:
     from replay.stages.gnss_ins_lc import GnssInsLoose
     from replay.stages.loose_config import LooseConfig
+def _sights(usual: Stage[Any], config: Any, topics: Collection[str]) -> Stages:
+    """The stage of orbits and corrections; only that of positions where a log brings the rest."""
+    from replay.stages.coarse import CoarsePositions
+
+    def brings(channel: ChannelSpec) -> bool:
+        name = config.gnss.receiver
+        return channel.at(receiver=name) in topics if name else any(map(channel.matches, topics))
+
+    corrected = brings(SATELLITES) and brings(CORRECTIONS) and not brings(COARSE)
+    return (CoarsePositions() if corrected else usual,)
+
+
 
     def stages(config: LooseConfig, topics: Collection[str]) -> Stages:
         return (GnssInsLoose(config.smoothing.record),)
@@ -90,7 +103,8 @@ def _kfspp() -> Parts:
     from replay.stages.spp_config import KfsppConfig
 
     def stages(config: KfsppConfig, topics: Collection[str]) -> Stages:
-        return (Satellites(), FilteredSinglePoint(config.smoothing.record))
+        last = FilteredSinglePoint(config.smoothing.record)
+        return (*_sights(Satellites(), config, topics), last)
 
     return KfsppConfig, stages
 
@@ -121,7 +135,10 @@ def _ppp() -> Parts:
     from replay.stages.ppp_config import PppConfig
     from replay.stages.precise_satellites import PreciseSatellites
 
-    return PppConfig, (PreciseSatellites(), Ppp())
+    def stages(config: PppConfig, topics: Collection[str]) -> Stages:
+        return (*_sights(PreciseSatellites(), config, topics), Ppp(config.smoothing.record))
+
+    return PppConfig, stages
 
 
 def _ppp_ins_tc() -> Parts:
@@ -130,7 +147,8 @@ def _ppp_ins_tc() -> Parts:
     from replay.stages.precise_satellites import PreciseSatellites
 
     def stages(config: PppInsConfig, topics: Collection[str]) -> Stages:
-        return (PreciseSatellites(), PppInertial(config.smoothing.record))
+        last = PppInertial(config.smoothing.record)
+        return (*_sights(PreciseSatellites(), config, topics), last)
 
     return PppInsConfig, stages
 

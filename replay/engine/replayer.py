@@ -2,7 +2,8 @@
 
 Rows go through in blocks; each stage takes its inputs' rows and its outputs are
 rows for the stages after it. What was recorded passes through untouched, so that
-the result can be replayed itself. No wall clock, no environment, no random state.
+the result can be replayed itself; a run that begins later takes along what the log
+knew by then (:mod:`replay.engine.standing`). No wall clock, no environment, no random state.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from replay.engine.graph import Node, bind
 from replay.engine.job import Job
 from replay.engine.pipelines import find_pipeline
 from replay.engine.sink import Sink, announce_as_recorded
+from replay.engine.standing import standing_rows
 from replay.engine.trace import StageTrace
 from replay.errors import CorruptLogError, LossReport, UsageError
 from replay.log import codec
@@ -107,9 +109,12 @@ class Replayer:
         """
         self._announce(sink)
         start_ns = self.job.start_ns
+        decode = {topic for node in self.nodes for topic in node.inputs.values()}
         if resume is not None:
             start_ns = self._take_over(resume, sink)
-        decode = {topic for node in self.nodes for topic in node.inputs.values()}
+        elif start_ns is not None:
+            for known in standing_rows(self.reader, start_ns, decode=list(decode)):
+                self._step(known, sink)
         batches = self.reader.batches(
             list(self.recorded),
             decode=[topic for topic in self.recorded if topic in decode],
@@ -132,7 +137,7 @@ class Replayer:
             {topic: digests[topic] for topic in sorted(self.recorded)},
             {topic: digests[topic] for topic in sorted(digests) if topic not in self.recorded},
             self._first_ns,
-            self._last_ns,
+            self._last_ns if self._first_ns >= 0 else -1,
             self.reader.report,
             self._notes(),
         )
@@ -188,8 +193,7 @@ class Replayer:
             whole = {topic: rows for topic, rows in batch.items() if len(rows)}
             if not whole:
                 continue
-            if self._first_ns < 0:
-                self._first_ns = min(int(rows.log_time_ns[0]) for rows in whole.values())
+            self._begin(whole)
             last = max(int(rows.log_time_ns[-1]) for rows in whole.values())
             if every > 0:
                 seen = max(self._last_ns, self._first_ns)
@@ -199,6 +203,13 @@ class Replayer:
                     whole = until(whole, due, included=False)
                     due += every
             yield whole, None
+
+    def _begin(self, batch: Batch) -> None:
+        """Note the first row of the stretch; what was known before it is not of it."""
+        if self._first_ns < 0:
+            begin = self.job.start_ns or 0
+            times = [rows.log_time_ns[rows.log_time_ns >= begin] for rows in batch.values()]
+            self._first_ns = min((int(t[0]) for t in times if len(t)), default=-1)
 
     def _step(self, batch: Batch, sink: Sink) -> None:
         rows = dict(batch)
@@ -296,8 +307,7 @@ class Replayer:
             kept = {topic: rows for topic, rows in batch.items() if len(rows)}
             if not kept:
                 continue
-            if self._first_ns < 0:
-                self._first_ns = min(int(rows.log_time_ns[0]) for rows in kept.values())
+            self._begin(kept)
             for topic, rows in kept.items():
                 counts[topic] += len(rows)
             for trace in copied:
@@ -318,6 +328,10 @@ class Replayer:
         Recovery leaves out a damaged chunk; a checkpoint after the hole hides it.
         """
         expected = dict.fromkeys(self.recorded, 0)
+        if self.job.start_ns is not None:
+            for known in standing_rows(self.reader, self.job.start_ns, decode=[]):
+                for topic, rows in known.items():
+                    expected[topic] += len(rows)
         for batch in self.reader.batches(
             list(self.recorded), decode=[], start_ns=self.job.start_ns, end_ns=at_ns + 1
         ):

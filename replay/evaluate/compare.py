@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from replay.channels import SOLUTION
+from replay.engine.manifest import MANIFEST, read_manifest
 from replay.errors import MissingChannelError
 from replay.evaluate import outages
 from replay.evaluate.ambiguities import WRONG_FIX_LIMIT_M
@@ -18,6 +20,7 @@ from replay.evaluate.read import RunChannels, read_run, runs_of
 from replay.evaluate.report import Evaluation
 from replay.evaluate.run import evaluate_channels
 from replay.evaluate.status import updated
+from replay.log.reader import LogReader
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +55,9 @@ def read_methods(
 ) -> list[Method]:
     """Every run of the logs, in their order, against the truth in its own log.
 
+    A run that a later one only took over from another of the logs, as a smoother takes its
+    filter's, stands once.
+
     Parameters
     ----------
     logs : sequence of Path
@@ -68,7 +74,8 @@ def read_methods(
         Where one cannot be read.
     """
     found: list[tuple[Path, RunChannels]] = []
-    for log in logs:
+    repeated = _passed_through(logs)
+    for place, log in enumerate(logs):
         names = runs_of(log)
         if not names:
             raise MissingChannelError(
@@ -76,7 +83,7 @@ def read_methods(
                 where=str(log),
                 mend="compare logs that `replay run` made",
             )
-        found += [(log, read_run(log, run=name)) for name in names]
+        found += [(log, read_run(log, run=name)) for name in names if (place, name) not in repeated]
     return [
         make_method(
             data,
@@ -87,6 +94,24 @@ def read_methods(
         )
         for (log, data), name in zip(found, _names(found), strict=True)
     ]
+
+
+def _passed_through(logs: Sequence[Path]) -> set[tuple[int, str]]:
+    """Place of a log and name of a run that it took over from another of the logs."""
+    made: set[tuple[str, str]] = set()
+    taken: list[tuple[int, str, str]] = []
+    for place, log in enumerate(logs):
+        with LogReader(log) as reader:
+            if MANIFEST not in reader.metadata:
+                continue
+            manifest = read_manifest(reader.metadata, str(log))
+        made |= {(d.topic, d.sha256) for d in manifest.outputs if SOLUTION.matches(d.topic)}
+        taken += [(place, d.topic, d.sha256) for d in manifest.inputs if SOLUTION.matches(d.topic)]
+    return {
+        (place, SOLUTION.parts(topic)["run"])
+        for place, topic, digest in taken
+        if (topic, digest) in made
+    }
 
 
 def make_method(

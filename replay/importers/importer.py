@@ -6,6 +6,7 @@ import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from replay.importers.clock import text_columns, valid_times
 from replay.importers.delimited import read_csv
 from replay.importers.files import File, read_file
 from replay.importers.findings import Findings
+from replay.importers.log_streams import FORMAT as LOG
+from replay.importers.log_streams import log_metadata, own_defaults
 from replay.importers.matlab import read_mat
 from replay.importers.messages import Rows, build_rows
 from replay.importers.ordering import join_tables, order_rows
@@ -212,8 +215,9 @@ class _Import:
                     for name, file in sorted(self.files.items())
                 },
             )
-            if self.spec.defaults:
-                writer.add_metadata(DEFAULTS, {"toml": to_toml(self.spec.defaults)})
+            defaults = self._metadata(writer)
+            if defaults:
+                writer.add_metadata(DEFAULTS, {"toml": to_toml(defaults)})
         return ImportResult(
             out=out,
             rows={topic: len(columns) for topic, columns in batch.items()},
@@ -223,6 +227,24 @@ class _Import:
             notes=(*self.spec.notes, *self.findings.notes),
             mismatches=compare_digests(self.spec.expect, topics, digests),
         )
+
+    def _metadata(self, writer: LogWriter) -> dict[str, dict[str, Any]]:
+        """Take over what logs among the sources say; the settings, those of the spec over them."""
+        told: dict[str, dict[str, str]] = {}
+        defaults: dict[str, dict[str, Any]] = {}
+        used = [source for stream in self.spec.streams.values() for source in stream.sources]
+        for name in dict.fromkeys(used):
+            if self.spec.sources[name].format == LOG:
+                metadata = log_metadata(self.data / self.spec.sources[name].file)
+                for section, values in own_defaults(metadata).items():
+                    defaults[section] = {**defaults.get(section, {}), **values}
+                told |= metadata
+        for name, values in sorted(told.items()):
+            if name not in (DEFAULTS, SOURCES):
+                writer.add_metadata(name, values)
+        for section, values in self.spec.defaults.items():
+            defaults[section] = {**defaults.get(section, {}), **values}
+        return defaults
 
     def _local(self, notes: tuple[str, ...]) -> list[str]:
         """Notes without the folder, so that a log does not depend on where its files lay."""

@@ -13,7 +13,7 @@ from replay.importers.findings import Findings
 from replay.importers.product_files import Bool, Float64, name_numbers
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.log.codec import codec_for
-from replay.log.columns import Columns, Int64, concatenate
+from replay.log.columns import Columns, Int64, Ragged, concatenate
 
 SERIES: Final = (
     channels.PRECISE_ORBIT.topic,
@@ -53,7 +53,9 @@ def _identity(columns: Columns) -> Int64:
     number = np.zeros(len(columns), dtype=np.int64)
     for name in ("satellite", "station", "height_m"):
         if name in columns.values:
-            column = columns[name]
+            column = columns.values[name]
+            if isinstance(column, Ragged):
+                column = np.array(column.blobs(), dtype=np.bytes_)
             if column.dtype.kind == "S":
                 place = name_numbers(column.astype("S16"))
             else:

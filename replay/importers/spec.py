@@ -18,6 +18,8 @@ specific_force_body_m_s2 = { columns = ["ax", "-ay", "az"], unit = "g" }
 [streams.rover]                   # a file of several channels with times of its own
 source = "rover"                  # its format is one of replay.importers.streams
 receiver = "rover"
+[streams.before]                  # a log that the files above are added to: all that was
+source = "before"                 # recorded in it; its source is of format "log"
 [defaults.filter]                 # for the configuration of pipelines over the log
 [expect]                          # channel name, or stream name and topic -> digest
 "rover /gnss/rover/obs" = "…"

@@ -24,6 +24,8 @@ from replay.importers.earth_rotation import earth_rotation_stream
 from replay.importers.files import File
 from replay.importers.findings import Findings
 from replay.importers.ionex import ionex_stream
+from replay.importers.log_streams import FORMAT as LOG
+from replay.importers.log_streams import log_stream
 from replay.importers.ocean_loading import ocean_loading_stream
 from replay.importers.product_joins import SERIES, check_frames, join_series
 from replay.importers.rinex_clock import rinex_clock_stream
@@ -59,6 +61,7 @@ class Format:
 
 
 FORMATS: Final[dict[str, Format]] = {
+    LOG: Format(log_stream),
     "rinex-obs": Format(rinex_obs_stream),
     "rinex-nav": Format(rinex_nav_stream, available="start"),
     "corrected-ranges-mat": Format(corrected_ranges_stream),
@@ -224,14 +227,14 @@ class Streams:
             start = _first([columns.valid_time_ns for columns in every])
         if channels.PRODUCTS.topic in self._parts:
             products = self._parts[channels.PRODUCTS.topic]
-            check_frames(concatenate([part.columns for part in products]), self._findings)
+            files = _alike(channels.PRODUCTS.topic, [part.columns for part in products])
+            check_frames(concatenate(files), self._findings)
         return {topic: self._join(topic, parts, start) for topic, parts in self._parts.items()}
 
     def _join(self, topic: str, parts: list[_Part], start: int) -> Columns:
+        found = _alike(topic, [part.columns for part in parts])
         columns = (
-            join_series(topic, [part.columns for part in parts], self._findings)
-            if topic in SERIES
-            else concatenate([part.columns for part in parts])
+            join_series(topic, found, self._findings) if topic in SERIES else concatenate(found)
         )
         log = np.where(columns.log_time_ns < 0, start, columns.log_time_ns)
         valid = np.where(columns.valid_time_ns < 0, start, columns.valid_time_ns)
@@ -262,6 +265,20 @@ class Streams:
             )
             self._findings.notes.append(text)
         return np.array(rows, dtype=np.int64)
+
+
+def _alike(topic: str, parts: list[Columns]) -> list[Columns]:
+    """Parts with the same fields in the same form: those of a log have every field."""
+    forms = [{name: type(c) for name, c in part.values.items()} for part in parts]
+    if all(form == forms[0] for form in forms):
+        return parts
+    spec = channels.find(topic)
+    codec = codec_for(spec.message if spec else "")
+    alike = []
+    for part in parts:
+        decoded = codec.decode(codec.encode(part))
+        alike.append(dataclasses.replace(part, values=decoded.values, present=decoded.present))
+    return alike
 
 
 def _shift(columns: Columns, by_ns: int) -> Columns:

@@ -18,6 +18,8 @@ from replay.log.chunks import ChunkError, decompress
 from replay.log.columns import Payloads
 from replay.log.rows import Rows
 
+_AROUND = 1 << 16  # bytes; Linux's usual fault_around_bytes
+
 
 class DamageError(Exception):
     """Bytes that are not what they should be.
@@ -80,8 +82,10 @@ class Source:
         """
         if self._map is None or not hasattr(mmap, "MADV_DONTNEED"):
             return
-        first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
-        last = (start + length) // mmap.PAGESIZE * mmap.PAGESIZE
+        # The system maps the neighbours of a page that is looked at along with it, those of
+        # bytes that were forgotten before as well.
+        first = max(0, start - _AROUND) // mmap.PAGESIZE * mmap.PAGESIZE
+        last = min(self.size, start + length + _AROUND)
         if last > first:
             self._map.madvise(mmap.MADV_DONTNEED, first, last - first)
 

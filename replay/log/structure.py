@@ -193,6 +193,8 @@ def entries(source: Source, start: int, end: int) -> tuple[list[Entry], int]:
     columns = [np.empty(count, dtype=np.int64) for _ in range(5)]
     if count:
         _scan.walk_section(source.array, start, end, _RUN_BYTES, opcode, *columns)
+    # A look at the head of every record maps a good part of the file.
+    source.forget(start, end - start)
     lists = [column.tolist() for column in columns]
     return [Entry(*row) for row in zip(opcode.tolist(), *lists, strict=True)], stop
 
@@ -236,6 +238,7 @@ def read_structure(source: Source, *, check_crc: bool) -> Structure:
         structure.definitions.add(opcode, content, place)
     for entry in found[1:-1]:
         take_entry(source, structure, summary, entry)
+        source.forget(entry.offset, 0)
     _check_totals(structure, summary)
     return structure
 

@@ -63,6 +63,9 @@ class EventKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     EVENT_KIND_INTEGER_REPAIRED: _ClassVar[EventKind]
     EVENT_KIND_STATION_LOST: _ClassVar[EventKind]
     EVENT_KIND_STATION_FOUND: _ClassVar[EventKind]
+    EVENT_KIND_PRODUCT_LACKING: _ClassVar[EventKind]
+    EVENT_KIND_PRODUCT_CONTINUED: _ClassVar[EventKind]
+    EVENT_KIND_FRAMES_DIFFER: _ClassVar[EventKind]
 MEASUREMENT_KIND_UNKNOWN: MeasurementKind
 MEASUREMENT_KIND_POSITION: MeasurementKind
 MEASUREMENT_KIND_VELOCITY: MeasurementKind
@@ -109,6 +112,9 @@ EVENT_KIND_BASE_LOST: EventKind
 EVENT_KIND_INTEGER_REPAIRED: EventKind
 EVENT_KIND_STATION_LOST: EventKind
 EVENT_KIND_STATION_FOUND: EventKind
+EVENT_KIND_PRODUCT_LACKING: EventKind
+EVENT_KIND_PRODUCT_CONTINUED: EventKind
+EVENT_KIND_FRAMES_DIFFER: EventKind
 
 class FilterState(_message.Message):
     __slots__ = ("position_ecef_m", "velocity_ecef_m_s", "q_body_to_ecef", "gyro_bias_body_rad_s", "accel_bias_body_m_s2", "gyro_scale_factor", "accel_scale_factor", "mounting_angles_rad", "non_slip_point_body_m", "squat_rad_s2_m")

@@ -10,6 +10,7 @@ from replay.gnss.measurements import SATELLITE_NAMES, signal_names
 from replay.kernels import precise_orbits
 from replay.kernels import precise_records as records
 from replay.log.columns import Columns, Ragged
+from replay.schemas import filter_pb2
 from replay.stages.gnss_columns import EVENT_TEXT
 
 Array = np.ndarray[Any, Any]
@@ -46,13 +47,20 @@ _TEXT: Final = {
         )
     },
 }
-_FRAMES: Final = 0  # no kind of event is of products as a whole
+# What is not told as NO_SATELLITE: that the satellite cannot be used.
+_OTHER_KINDS: Final = {
+    records.CONTINUED: filter_pb2.EVENT_KIND_PRODUCT_CONTINUED,
+    records.NO_BIAS: filter_pb2.EVENT_KIND_PRODUCT_LACKING,
+    records.NO_MAP: filter_pb2.EVENT_KIND_PRODUCT_LACKING,
+}
 
 
 def precise_event_columns(notes: Array) -> Columns:
     """Events of the loop's notes, each with what it was in its text."""
-    details = []
+    details, kinds = [], []
     for row in notes:
+        reason = int(row["kind"]) % _CLOCK // _KIND
+        kinds.append(_OTHER_KINDS.get(reason, int(row["kind"]) % _KIND))
         number = row["satellite"]
         name = SATELLITE_NAMES[number].decode() if number >= 0 else ""
         signal = signal_names(row["value"].astype(np.int64).reshape(1))[0].decode()
@@ -62,7 +70,7 @@ def precise_event_columns(notes: Array) -> Columns:
     return Columns.build(
         notes["t"],
         {
-            "kind": (notes["kind"] % _KIND).astype(np.int32),
+            "kind": np.array(kinds, dtype=np.int32),
             "value": np.where(plain, notes["value"], 0.0),
             "detail": Ragged.from_texts(details),
         },
@@ -95,7 +103,7 @@ def frame_events(known: list[str], files: Columns) -> Columns | None:
     return Columns.build(
         log_t,
         {
-            "kind": np.full(len(rows), _FRAMES, dtype=np.int32),
+            "kind": np.full(len(rows), filter_pb2.EVENT_KIND_FRAMES_DIFFER, dtype=np.int32),
             "value": np.zeros(len(rows)),
             "detail": Ragged.from_texts(details),
         },

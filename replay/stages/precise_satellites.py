@@ -109,7 +109,7 @@ class PreciseSatellites:
         observations = Port(channels.GNSS_OBS, role)
         self.spec = StageSpec(
             name="precise-satellites" if role == RECEIVER else f"{role}-precise-satellites",
-            version=1,
+            version=2,
             inputs=(
                 observations,
                 *(

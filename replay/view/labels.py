@@ -30,6 +30,9 @@ _LEVELS: Final[dict[int, str]] = {
     filter_pb2.EVENT_KIND_AMBIGUITIES_LOST: _WARN,
     filter_pb2.EVENT_KIND_CLOCK_JUMP: _WARN,
     filter_pb2.EVENT_KIND_BASE_LOST: _WARN,
+    filter_pb2.EVENT_KIND_PRODUCT_LACKING: _WARN,
+    filter_pb2.EVENT_KIND_PRODUCT_CONTINUED: _WARN,
+    filter_pb2.EVENT_KIND_FRAMES_DIFFER: _ERROR,
     filter_pb2.EVENT_KIND_TIME_BACKWARD: _ERROR,
     filter_pb2.EVENT_KIND_NOT_FINITE: _CRITICAL,
 }

@@ -15,6 +15,7 @@ from replay.errors import MissingChannelError
 from replay.evaluate import evaluate_run, runs_of
 from replay.evaluate.compare import read_methods, to_json_dict
 from replay.evaluate.compare_table import markdown, print_comparison
+from replay.log.reader import LogReader
 from replay.log.writer import LogWriter
 
 T = np.arange(0.0, 20.0)
@@ -90,3 +91,24 @@ def test_the_table_in_three_forms(tmp_path):
     assert only["name"] == only["run"] == "spp"
     assert only["position_error_m"]["horizontal"]["rms"] == pytest.approx(5.0, abs=1e-6)
     assert methods[0].data.solution["status"][0] == UPDATED
+
+
+def test_a_run_that_was_taken_over_stands_once(tmp_path):
+    """A smoothed run's log holds its filter's, too; beside that log it is told once."""
+    solution = channels.SOLUTION.at(run="rtk")
+    one = write(tmp_path / "one.mcap", {"rtk": np.ones(3)})
+    with LogReader(one) as reader:
+        digest = {"topic": solution, "sha256": reader.digests()[solution].sha256}
+    one = write(tmp_path / "one.mcap", {"rtk": np.ones(3)}, manifest={"outputs": [digest]})
+    both = {"rtk": np.ones(3), "rtk-smoothed": np.zeros(3)}
+    two = write(tmp_path / "two.mcap", both, manifest={"inputs": [digest]})
+    assert [m.name for m in read_methods([one, two])] == ["rtk", "rtk-smoothed"]
+    assert sorted(m.name for m in read_methods([two])) == ["rtk", "rtk-smoothed"]
+    # Of another run of the same name nothing is left out.
+    other = write(
+        tmp_path / "other.mcap",
+        {"rtk": np.zeros(3)},
+        manifest={"outputs": [{"topic": solution, "sha256": "0" * 64}]},
+    )
+    names = [m.name for m in read_methods([other, two])]
+    assert sorted(names) == ["other:rtk", "rtk-smoothed", "two:rtk"]

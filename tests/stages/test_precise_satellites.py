@@ -11,9 +11,11 @@ from replay import channels
 from replay.errors import ConfigurationError, MissingChannelError
 from replay.gnss.measurements import gather_epochs, select_signals
 from replay.log.columns import Ragged, concatenate
+from replay.schemas import filter_pb2
 from replay.stages.base import Context
 from replay.stages.precise_satellites import PreciseSatellites
 from replay.stages.satellites import config_record
+from replay.view.events import events_of
 from tests.engine.drives import content, cut
 from tests.stages.gnss_chain import (
     COARSE,
@@ -281,3 +283,39 @@ def test_a_map_needs_a_precise_pipeline_and_a_log_with_maps():
         PreciseSatellites().start(config, Context(topics, {}))
     with pytest.raises(MissingChannelError, match="orbit"):
         PreciseSatellites().start(precise_config("ccj2"), Context({OBS: "/gnss/a/obs"}, {}))
+
+
+def test_events_say_what_of_the_products_lacks(station):
+    """Each kind of its own, so that a page and a recording name it."""
+    first = int(station[OBS].valid_time_ns.min())
+    files = station[FILES]
+    values = {**files.values, "frame": Ragged.from_texts(["IGS14", "ITRF2020", "", ""])}
+    orbits = station[ORBIT]
+    coarser = orbits.take(
+        np.flatnonzero(
+            ((orbits.valid_time_ns - first) % (300 * SECOND) == 0) & (orbits["satellite"] != b"G08")
+        )
+    )
+    inputs = {
+        **station,
+        FILES: dataclasses.replace(files, values=values, payloads=None),
+        ORBIT: between(coarser, 0, first + 3000 * SECOND),
+        BIAS: station[BIAS].take(np.flatnonzero(station[BIAS]["satellite"] != b"G27")),
+    }
+    events = precise(inputs, precise_config("ccj2"))[PROBLEMS]
+    kinds = {
+        kind: {text for text, own in zip(details({PROBLEMS: events}), events["kind"], strict=True)
+               if own == filter_pb2.EventKind.Value(f"EVENT_KIND_{kind}")}
+        for kind in ("NO_EPHEMERIS", "PRODUCT_LACKING", "PRODUCT_CONTINUED", "FRAMES_DIFFER")
+    }  # fmt: skip
+    assert "G08: the products have no orbit of it" in kinds["NO_EPHEMERIS"]
+    assert {"G27: the products have no bias of C1C"} <= kinds["PRODUCT_LACKING"]
+    assert all("past the epochs of the products" in text for text in kinds["PRODUCT_CONTINUED"])
+    assert kinds["PRODUCT_CONTINUED"]
+    (frames,) = kinds["FRAMES_DIFFER"]
+    assert "IGS14 and ITRF2020" in frames
+    assert sum(len(texts) for texts in kinds.values()) <= len(events)
+    # In words, as a page and a recording show them.
+    shown = events_of(events)
+    assert not any(event.kind.startswith("unknown") for event in shown)
+    assert {event.level for event in shown if "frames" in event.detail} == {"ERROR"}
