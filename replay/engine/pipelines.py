@@ -33,12 +33,15 @@ class Pipeline:
         Settings and stages. It imports them, so that a run loads its own kernels alone.
     unnamed : callable, optional
         Name of a run over a log with given topics, where the settings leave it empty.
+    unsmoothed : str
+        Why its runs cannot be smoothed; empty for those of a filter that can record.
     """
 
     name: str
     about: str
     parts: Callable[[], Parts]
     unnamed: Callable[[Any, Collection[str]], str] | None = None
+    unsmoothed: str = ""
 
     @property
     def config(self) -> type[Section]:
@@ -56,9 +59,6 @@ class Pipeline:
         return name if name or self.unnamed is None else self.unnamed(config, topics)
 
 
-def _gnss_ins_lc() -> Parts:
-    from replay.stages.gnss_ins_lc import GnssInsLoose
-    from replay.stages.loose_config import LooseConfig
 def _sights(usual: Stage[Any], config: Any, topics: Collection[str]) -> Stages:
     """The stage of orbits and corrections; only that of positions where a log brings the rest."""
     from replay.stages.coarse import CoarsePositions
@@ -71,6 +71,9 @@ def _sights(usual: Stage[Any], config: Any, topics: Collection[str]) -> Stages:
     return (CoarsePositions() if corrected else usual,)
 
 
+def _gnss_ins_lc() -> Parts:
+    from replay.stages.gnss_ins_lc import GnssInsLoose
+    from replay.stages.loose_config import LooseConfig
 
     def stages(config: LooseConfig, topics: Collection[str]) -> Stages:
         return (GnssInsLoose(config.smoothing.record),)
@@ -233,21 +236,28 @@ def _network_virtual() -> Parts:
 
 
 def _smooth() -> Parts:
-    from replay.channels import FILTER_STATE
-    from replay.stages.smooth import Smoother, find_run
+    from replay.channels import FILTER_STATE, RELATIVE_POSITION
+    from replay.stages.smooth import Smoother
+    from replay.stages.smooth_choice import find_run
     from replay.stages.smooth_config import SmoothConfig
 
     def stages(config: SmoothConfig, topics: Collection[str]) -> Stages:
-        run = find_run(config, topics)
-        return (Smoother(run, inertial=FILTER_STATE.at(run=run) in topics),)
+        run = find_run(config, topics, _unsmoothed())
+        inertial = FILTER_STATE.at(run=run) in topics
+        return (Smoother(run, inertial, relative=RELATIVE_POSITION.at(run=run) in topics),)
 
     return SmoothConfig, stages
 
 
 def _smoothed(config: Any, topics: Collection[str]) -> str:
-    from replay.stages.smooth import find_run
+    from replay.stages.smooth_choice import find_run
 
-    return f"{find_run(config, topics)}-smoothed"
+    return f"{find_run(config, topics, _unsmoothed())}-smoothed"
+
+
+def _unsmoothed() -> dict[str, str]:
+    """Pipelines whose runs cannot be smoothed, and why."""
+    return {p.name: p.unsmoothed for p in _ALL if p.unsmoothed}
 
 
 _ALL: Final = (
@@ -265,6 +275,7 @@ _ALL: Final = (
         "spp",
         "single-point positioning: pseudoranges to position, Doppler to velocity",
         _spp,
+        unsmoothed="every epoch is solved by itself, nothing goes on from one to the next",
     ),
     Pipeline(
         "kfspp",
@@ -275,6 +286,7 @@ _ALL: Final = (
         "tdcp",
         "displacements from time-differenced carrier phases, chained to positions",
         _tdcp,
+        unsmoothed="displacements are solved one by one, no filter carries them",
     ),
     Pipeline(
         "tdcp-ins",
@@ -305,6 +317,7 @@ _ALL: Final = (
         "network",
         "reference stations: integers and errors of their baselines",
         _network,
+        unsmoothed="it gives corrections of a network, and the place of no receiver",
     ),
     Pipeline(
         "network-rtk",
@@ -320,6 +333,7 @@ _ALL: Final = (
         "network-virtual",
         "a virtual reference station near the rover, from a network of reference stations",
         _network_virtual,
+        unsmoothed="it gives observations of a virtual station, and the place of no receiver",
     ),
     Pipeline(
         "moving-base",

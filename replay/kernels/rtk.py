@@ -72,6 +72,7 @@ from replay.kernels.rtk_states import (
     predict,
 )
 from replay.kernels.single_point import SINGLE_STATE_DTYPE, solve_epoch, solve_velocity, true_time
+from replay.kernels.state_names import BASELINE
 from replay.kernels.transition import (
     GIVEN_INTEGERS,
     OWN,
@@ -555,12 +556,17 @@ def run_rtk(
             counts[1] += 1
         if here and trail["on"] == 1:
             told = SILENT
-            if total > 0 and cfg["moving"] == 0:
+            if total > 0:
                 held = cfg["mode"] == HOLD and s["fixed"] + 1 >= cfg["hold_count"]
                 held = held and tries[0]["whole"] == 1
                 told = GIVEN_INTEGERS if status == FIXED and not held else OWN
             for i in range(s["n"]):
                 trail["estimate"][i] = x[i]
+            if cfg["moving"] == 1:
+                # Where the base is, no state knows: the position is about where it was taken to be.
+                for i in range(3):
+                    trail["estimate"][i] -= base_x[i]
+                    trail["name"][i] = BASELINE + i
             close_node(trail, P, s["n"], t, log_t, told, nodes)
         if status == FIXED and s["status"] != FIXED:
             note(notes, counts, t, log_t, EVENT_FIXED, -1, float(tries[0]["fixed"]))

@@ -5,8 +5,6 @@ with a prior. What a receiver says of broken phases is remembered until it was a
 also from epochs that the filter does not use.
 """
 
-from typing import Final
-
 import numpy as np
 from numba import njit
 
@@ -20,15 +18,13 @@ from replay.kernels.rtk_records import (
     STATIC,
     VELOCITY,
 )
+from replay.kernels.state_names import name_differences
 from replay.kernels.types import Array, Record
 
 _HALF_CYCLE = 2
 _LOST = 1
 _JOIN_S = 10.0
 _CLOCK_SPACE = 1
-NAME_WET: Final = 2000
-NAME_SLANT: Final = 3000
-NAME_AMBIGUITY: Final = 10000
 
 
 @njit(cache=True)
@@ -322,22 +318,12 @@ def name_states(s: Record, lead: int, shift: int, name: Array) -> None:
     shift : int
         How far behind the places in `s` the states stand; with `shift` the motion is left out.
     name : int64 array
-        Filled: the place within the motion, else NAME_WET and the end, NAME_SLANT and the
-        satellite, NAME_AMBIGUITY and satellite times SLOTS plus slot.
+        Filled: the place within the motion, else as :mod:`replay.kernels.state_names` has it.
     """
     if shift == 0:
         for i in range(lead):
             name[i] = i
-    if s["wet"] >= 0:
-        for end in range(2):
-            name[shift + s["wet"] + end] = NAME_WET + end
-    for satellite in range(SATELLITES):
-        if s["slant"][satellite] >= 0:
-            name[shift + s["slant"][satellite]] = NAME_SLANT + satellite
-        for slot in range(SLOTS):
-            place = s["amb"][satellite, slot]
-            if place >= 0:
-                name[shift + place] = NAME_AMBIGUITY + SLOTS * satellite + slot
+    name_differences(s, shift, name)
 
 
 @njit(cache=True)

@@ -16,6 +16,7 @@ from replay.kernels.rotation import (
     rotate3,
     rotate3_back,
 )
+from replay.kernels.rtk_output import write_baseline
 from replay.kernels.types import Array, Record
 
 
@@ -99,6 +100,46 @@ def smoothed_solutions(
             local_block(P, ATTITUDE, u, N)
             for i in range(3):
                 row["a_std"][i] = sqrt(max(0.0, N[i, i]))
+
+
+@njit(cache=True)
+def smoothed_relative(
+    estimates: tuple[Array, Array],
+    errors: tuple[Array, Array],
+    covariances: tuple[Array, Array],
+    shown: Array,
+    absolute: Array,
+    positions: Array,
+    baselines: Array,
+    rows: Array,
+) -> None:
+    """Positions relative to a base at nodes.
+
+    Parameters
+    ----------
+    estimates, errors, covariances : int64 offsets (nodes + 1,), values
+    shown : int64 array (nodes,)
+        As :func:`smoothed_solutions` takes them; the first three states are a position (m, ECEF).
+    absolute : int64 array (nodes,)
+        1 where it is a place, 0 where it is relative to the base.
+    positions, baselines : float64 arrays (nodes, 3), m, ECEF
+        The run's own: their difference is the base's place.
+    rows : array (nodes,) of BASELINE_ROW_DTYPE
+        With times, age and status; the rest is filled.
+    """
+    place, base, P, axes = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
+    for k in range(rows.shape[0]):
+        row, at = rows[k], covariances[0][k]
+        for i in range(3):
+            for j in range(i, 3):
+                P[i, j] = covariances[1][at + j - i]
+                P[j, i] = P[i, j]
+            at += shown[k] - i
+            base[i] = positions[k, i] - baselines[k, i]
+            place[i] = estimates[1][estimates[0][k] + i] + errors[1][errors[0][k] + i]
+            if absolute[k] == 0:
+                place[i] += base[i]
+        write_baseline(row, row["t"], row["log_t"], row["status"], place, P, base, row["age"], axes)
 
 
 @njit(cache=True)

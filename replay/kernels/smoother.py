@@ -100,7 +100,7 @@ def combine(
 
 
 @njit(cache=True)
-def _forward(U: Array, n: int, scale: Array, X: Array, upper: bool, f: Array) -> None:
+def forward_solve(U: Array, n: int, scale: Array, X: Array, upper: bool, f: Array) -> None:
     """X (n, n) becomes U'^-1 D X; with `upper` only what stands right of the diagonal and on it."""
     for k in range(n):
         row = X[k]
@@ -115,7 +115,7 @@ def _forward(U: Array, n: int, scale: Array, X: Array, upper: bool, f: Array) ->
 
 
 @njit(cache=True)
-def _backward(U: Array, n: int, X: Array, lower: bool, f: Array) -> None:
+def backward_solve(U: Array, n: int, X: Array, lower: bool, f: Array) -> None:
     """X (n, n) becomes U^-1 X; with `lower` only what stands left of the diagonal and on it.
 
     Its rows still lack the factors D.
@@ -133,16 +133,16 @@ def _backward(U: Array, n: int, X: Array, lower: bool, f: Array) -> None:
 @njit(cache=True)
 def solve_both(U: Array, n: int, scale: Array, X: Array, Y: Array, f: Array) -> None:
     """Symmetric X becomes P^-1 X P^-1 for the P of :func:`factor`; Y (n, n), f (n,) overwritten."""
-    _forward(U, n, scale, X, False, f)
+    forward_solve(U, n, scale, X, False, f)
     transpose(X, n, n, Y)
     # U'^-1 D X D U^-1 is symmetric: half of it will do.
-    _forward(U, n, scale, Y, True, f)
+    forward_solve(U, n, scale, Y, True, f)
     for i in range(n):
         for j in range(i):
             Y[i, j] = Y[j, i]
-    _backward(U, n, Y, False, f)
+    backward_solve(U, n, Y, False, f)
     transpose(Y, n, n, X)
-    _backward(U, n, X, True, f)
+    backward_solve(U, n, X, True, f)
     for i in range(n):
         for j in range(i + 1):
             X[i, j] *= scale[i] * scale[j]

@@ -17,16 +17,6 @@ LEAD: Final = 6
 PPP_TIGHT_STATES: Final = MAX_STATES + ROOM - LEAD
 """Error states at most."""
 
-# Numbers of the names of the states behind those of the inertial system and the vehicle.
-NAME_CLOCK: Final = 1000
-NAME_DRIFT: Final = 1001
-NAME_WET: Final = 1002
-NAME_GRADIENT: Final = 1003
-NAME_BETWEEN: Final = 1100
-NAME_BIAS: Final = 1200
-NAME_SLANT: Final = 3000
-NAME_AMBIGUITY: Final = 10000
-
 WHITE: Final = 0
 WALK: Final = 1
 

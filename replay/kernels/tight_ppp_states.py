@@ -18,21 +18,10 @@ from replay.kernels.covariance import (
     VELOCITY,
 )
 from replay.kernels.earth import EARTH_RATE_RAD_S
-from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.ppp_states import begin_again
 from replay.kernels.rotation import cross3, rotate3, rotate3_back
-from replay.kernels.tight_ppp_records import (
-    LEAD,
-    NAME_AMBIGUITY,
-    NAME_BETWEEN,
-    NAME_BIAS,
-    NAME_CLOCK,
-    NAME_DRIFT,
-    NAME_GRADIENT,
-    NAME_SLANT,
-    NAME_WET,
-    WALK,
-)
+from replay.kernels.state_names import name_precise
+from replay.kernels.tight_ppp_records import LEAD, WALK
 from replay.kernels.transition import carry_rate, repack
 from replay.kernels.types import Array, Record
 from replay.kernels.update import state_count, total_count
@@ -270,24 +259,4 @@ def name_states(q: Record, first: int, name: Array) -> None:
     name : int64 array
         Filled.
     """
-    shift = first - LEAD
-    if q["clock"] < 0:
-        return
-    name[shift + q["clock"]] = NAME_CLOCK
-    name[shift + q["drift"]] = NAME_DRIFT
-    name[shift + q["wet"]] = NAME_WET
-    if q["gradient"] >= 0:
-        name[shift + q["gradient"]] = NAME_GRADIENT
-        name[shift + q["gradient"] + 1] = NAME_GRADIENT + 1
-    for system in range(SYSTEMS):
-        if q["between"][system] >= 0:
-            name[shift + q["between"][system]] = NAME_BETWEEN + system
-        for slot in range(SLOTS):
-            if q["bias"][system, slot] >= 0:
-                name[shift + q["bias"][system, slot]] = NAME_BIAS + SLOTS * system + slot
-    for satellite in range(SATELLITES):
-        if q["slant"][satellite] >= 0:
-            name[shift + q["slant"][satellite]] = NAME_SLANT + satellite
-        for slot in range(SLOTS):
-            if q["amb"][satellite, slot] >= 0:
-                name[shift + q["amb"][satellite, slot]] = NAME_AMBIGUITY + SLOTS * satellite + slot
+    name_precise(q, first - LEAD, name)

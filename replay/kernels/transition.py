@@ -80,6 +80,12 @@ def begin_trail(trail: Record) -> None:
 
 
 @njit(cache=True)
+def part_trail(trail: Record) -> None:
+    """What this node says must not go back to the nodes before it; it may be an open one."""
+    trail["before"] = 0
+
+
+@njit(cache=True)
 def carry_rate(trail: Record, i: int, j: int, dt: float) -> None:
     """State `i` gains `dt` times state `j`."""
     T = trail["T"]

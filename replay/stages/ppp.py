@@ -15,7 +15,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
-from replay.gnss.measurements import Selection, select_signals
+from replay.gnss.measurements import Epochs, Selection, select_signals
 from replay.kernels import ppp, ppp_output, ppp_records
 from replay.kernels.gnss_records import BEIDOU, FIRST, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
@@ -50,6 +50,8 @@ from replay.stages.ppp_config import PppConfig
 from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
 from replay.stages.spp import excluded_satellites
 from replay.stages.spp_config import WEIGHTINGS
+from replay.stages.state_names import name_of
+from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import longest_gap, nominal_interval, read_epochs
 
 Array = np.ndarray[Any, Any]
@@ -80,12 +82,19 @@ class PppState:
     kernel: Array
     x: Array
     P: Array
+    recorder: Recorder
 
 
 class Ppp:
-    """The stage `ppp`."""
+    """The stage `ppp`.
 
-    spec = StageSpec(
+    Parameters
+    ----------
+    record : bool
+        Whether it writes transitions for a smoother.
+    """
+
+    _PLAIN: Final = StageSpec(
         name="ppp",
         version=1,
         inputs=(
@@ -110,6 +119,10 @@ class Ppp:
         trigger=Port(channels.GNSS_OBS),
     )
 
+    def __init__(self, record: bool = False) -> None:
+        self._record = record
+        self.spec = recording(self._PLAIN, record)
+
     def start(self, config: Section, context: Context) -> PppState:
         """State before the first row."""
         if not isinstance(config, PppConfig):
@@ -120,6 +133,7 @@ class Ppp:
             kernel=ppp_records.new_ppp_state(),
             x=np.zeros(ppp_records.ROOM),
             P=np.zeros((ppp_records.ROOM, ppp_records.ROOM)),
+            recorder=Recorder(ppp_records.ROOM, self._record, name_of()),
         )
 
     def step(self, state: PppState, block: Block) -> tuple[PppState, Outputs]:
@@ -127,24 +141,13 @@ class Ppp:
         found = read_epochs(block, state.selection)
         if found is None:
             return state, {}
-        epochs, rows = len(found.epochs), len(found.rows)
-        solutions = np.zeros(epochs, dtype=SINGLE_ROW_DTYPE)
-        innovations = np.zeros((2 * SLOTS + 2) * rows, dtype=RESIDUAL_DTYPE)
-        ambiguities = np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE)
-        resolutions = np.zeros(epochs, dtype=RESOLUTION_ROW_DTYPE)
-        # Per epoch a jump of the clock, too few satellites or a reset, a fix or its loss;
-        # breaks of ambiguities whose satellite may be out of view.
-        notes = np.zeros((5 + ppp_records.ROOM) * epochs, dtype=NOTE_DTYPE)
-        zeniths = np.zeros(epochs, dtype=ppp_records.ZENITH_ROW_DTYPE)
-        slants = np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE)
-        biases = np.zeros(SYSTEMS * SLOTS * epochs, dtype=ppp_records.BIAS_ROW_DTYPE)
-        phases = np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE)
-        counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
-        ppp.run_ppp(
-            state.kernel, state.x, state.P, state.config, np.zeros(1, dtype=SOLVE_DTYPE),
-            found.epochs, found.rows, solutions, innovations, ambiguities, resolutions, notes,
-            zeniths, slants, biases, phases, counts,
+        recorder = state.recorder
+        made = recorder.run(
+            lambda nodes: self._filter(state, found, nodes),
+            state.kernel, state.x, state.P, recorder.trail,
         )  # fmt: skip
+        solutions, innovations, ambiguities, resolutions, notes = made[:5]
+        zeniths, slants, biases, phases, counts = made[5:]
         solutions = solutions[: counts[ppp_output.SOLUTIONS]]
         columns: dict[channels.ChannelSpec, Columns] = {
             channels.FILTER_INNOVATIONS: residual_columns(
@@ -167,7 +170,35 @@ class Ppp:
             ),
             channels.SOLUTION: antenna_solution_columns(solutions),
         }
-        return state, {channel.name: found for channel, found in columns.items() if len(found)}
+        said = {channel.name: rows for channel, rows in columns.items()}
+        said.update(recorder.outputs())
+        return state, {name: rows for name, rows in said.items() if len(rows)}
+
+    @staticmethod
+    def _filter(state: PppState, found: Epochs, nodes: Nodes) -> tuple[Array, ...]:
+        """The compiled loop over a block: outputs and their counts."""
+        epochs, rows = len(found.epochs), len(found.rows)
+        solutions = np.zeros(epochs, dtype=SINGLE_ROW_DTYPE)
+        innovations = np.zeros((2 * SLOTS + 2) * rows, dtype=RESIDUAL_DTYPE)
+        ambiguities = np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE)
+        resolutions = np.zeros(epochs, dtype=RESOLUTION_ROW_DTYPE)
+        # Per epoch a jump of the clock, too few satellites or a reset, a fix or its loss;
+        # breaks of ambiguities whose satellite may be out of view.
+        notes = np.zeros((5 + ppp_records.ROOM) * epochs, dtype=NOTE_DTYPE)
+        zeniths = np.zeros(epochs, dtype=ppp_records.ZENITH_ROW_DTYPE)
+        slants = np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE)
+        biases = np.zeros(SYSTEMS * SLOTS * epochs, dtype=ppp_records.BIAS_ROW_DTYPE)
+        phases = np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE)
+        counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
+        ppp.run_ppp(
+            state.kernel, state.x, state.P, state.config, np.zeros(1, dtype=SOLVE_DTYPE),
+            found.epochs, found.rows, solutions, innovations, ambiguities, resolutions, notes,
+            zeniths, slants, biases, phases, counts, state.recorder.trail, nodes,
+        )  # fmt: skip
+        return (
+            *(solutions, innovations, ambiguities, resolutions, notes),
+            *(zeniths, slants, biases, phases, counts),
+        )
 
     def finish(self, state: PppState) -> Outputs:
         """Nothing is left to say."""
@@ -176,19 +207,26 @@ class Ppp:
     def dump(self, state: PppState) -> bytes:
         """The state as bytes."""
         n = int(state.kernel["n"][0])
-        return dump_arrays({"kernel": state.kernel, "x": state.x[:n], "P": state.P[:n, :n]})
+        return dump_arrays(
+            {
+                "kernel": state.kernel,
+                "x": state.x[:n],
+                "P": state.P[:n, :n],
+                **state.recorder.arrays(),
+            }
+        )
 
     def restore(self, state: PppState, data: bytes) -> PppState:
         """The state of a dump."""
         number = np.dtype(np.float64)
-        arrays: dict[str, Any] = restore_arrays(
-            data, {"kernel": ppp_records.PPP_STATE_DTYPE, "x": number, "P": number}
-        )
+        types = {"kernel": ppp_records.PPP_STATE_DTYPE, "x": number, "P": number}
+        arrays: dict[str, Any] = restore_arrays(data, {**types, **state.recorder.types()})
+        recorder = state.recorder.restored(arrays)
         n = int(arrays["kernel"]["n"][0])
         x, P = np.zeros_like(state.x), np.zeros_like(state.P)
         x[:n] = arrays["x"]
         P[:n, :n] = arrays["P"]
-        return dataclasses.replace(state, kernel=arrays["kernel"], x=x, P=P)
+        return dataclasses.replace(state, kernel=arrays["kernel"], x=x, P=P, recorder=recorder)
 
 
 def ppp_config(config: PppConfig, context: Context) -> Array:

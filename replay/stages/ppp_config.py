@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from replay.configuration import Section, quantity
 from replay.stages.gnss_config import Gnss
 from replay.stages.precise_config import PreciseConfig
+from replay.stages.smoothing_config import Smoothing
 from replay.stages.spp_config import Weighting
 
 
@@ -147,3 +148,4 @@ class PppConfig(PreciseConfig, frozen=True):
     name: str = "ppp"
     gnss: PppGnss = PppGnss()
     ppp: Ppp = Ppp()
+    smoothing: Smoothing = Smoothing()

@@ -15,7 +15,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
-from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals
+from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import (
     ppp_output,
     ppp_records,
@@ -27,7 +27,6 @@ from replay.kernels.gnss_records import (
     EPOCH_DTYPE,
     MEASURED_DTYPE,
     SLOTS,
-    SYSTEM_LETTERS,
     SYSTEMS,
 )
 from replay.kernels.least_squares import SOLVE_DTYPE
@@ -65,6 +64,7 @@ from replay.stages.ppp_columns import (
 )
 from replay.stages.ppp_ins_config import PppInsConfig
 from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
+from replay.stages.state_names import name_of
 from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import SAMPLE_TYPES, HeldSamples, forget_epochs, join_epochs, read_epochs
 
@@ -149,7 +149,7 @@ class PppInertial:
             kernel=ppp_records.new_ppp_state(),
             epochs=np.zeros(0, dtype=EPOCH_DTYPE),
             rows=np.zeros(0, dtype=MEASURED_DTYPE),
-            recorder=Recorder(_STATES, self._record, _NameOf(names_of(inertial))),
+            recorder=Recorder(_STATES, self._record, name_of(names_of(inertial))),
         )
 
     def step(self, state: PppInsState, block: Block) -> tuple[PppInsState, Outputs]:
@@ -260,36 +260,6 @@ class PppInertial:
         )  # fmt: skip
         state.recorder.take_back(work)
         return taken, out
-
-
-class _NameOf:
-    """Name of a state by the number that the filter gives it in a node."""
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self.names = names
-
-    def __call__(self, number: int) -> str:
-        own = tight_ppp_records
-        plain = {
-            own.NAME_CLOCK: "clock",
-            own.NAME_DRIFT: "clock_drift",
-            own.NAME_WET: "wet_delay",
-            own.NAME_GRADIENT: "gradient_north",
-            own.NAME_GRADIENT + 1: "gradient_east",
-        }
-        if number < own.NAME_CLOCK:
-            return self.names[number]
-        if number in plain:
-            return plain[number]
-        if number < own.NAME_BIAS:
-            return f"clock_{SYSTEM_LETTERS[number - own.NAME_BETWEEN]}"
-        if number < own.NAME_SLANT:
-            system, slot = divmod(number - own.NAME_BIAS, SLOTS)
-            return f"bias_{SYSTEM_LETTERS[system]}_{slot}"
-        if number < own.NAME_AMBIGUITY:
-            return f"ionosphere_{SATELLITE_NAMES[number - own.NAME_SLANT].decode()}"
-        satellite, slot = divmod(number - own.NAME_AMBIGUITY, SLOTS)
-        return f"ambiguity_{SATELLITE_NAMES[satellite].decode()}_{slot}"
 
 
 def _dump_types() -> dict[str, np.dtype[Any]]:

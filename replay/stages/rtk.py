@@ -43,7 +43,6 @@ from replay.stages.rtk_columns import (
     RTK_EVENT_TEXT,
     ambiguity_columns,
     baseline_columns,
-    difference_name,
     resolution_columns,
 )
 from replay.stages.rtk_config import RtkConfig
@@ -51,6 +50,7 @@ from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.satellites import Satellites
 from replay.stages.spp import single_config
 from replay.stages.spp_config import WEIGHTINGS
+from replay.stages.state_names import name_of
 from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import (
     EPOCH_READS,
@@ -63,9 +63,6 @@ from replay.stages.waiting import (
 Array = np.ndarray[Any, Any]
 
 _NS: Final = 1_000_000_000
-_MOTION: Final = tuple(
-    f"{kind}_ecef_{axis}" for kind in ("position", "velocity", "acceleration") for axis in "xyz"
-)
 _DYNAMICS: Final = ("static", "kinematic", "velocity", "acceleration")
 _MODES: Final = ("instantaneous", "continuous", "fix-and-hold", "float")
 _TESTS: Final = ("ratio", "w-ratio")
@@ -136,7 +133,7 @@ class Rtk:
             kernel=rtk_records.new_rtk_state(),
             x=np.zeros(rtk_records.ROOM),
             P=np.zeros((rtk_records.ROOM, rtk_records.ROOM)),
-            recorder=Recorder(rtk_records.ROOM, self._record, _name_of),
+            recorder=Recorder(rtk_records.ROOM, self._record, name_of(first_slot=1)),
         )
 
     def step(self, state: RtkState, block: Block) -> tuple[RtkState, Outputs]:
@@ -245,11 +242,6 @@ class MovingBaseSatellites(Satellites):
     def start(self, config: Section, context: Context) -> Any:
         """State before the first row: the base finds its own coarse position."""
         return Satellites(RECEIVER).start(config, context)
-
-
-def _name_of(number: int) -> str:
-    """Name of a state by the number that the filter gives it in a node."""
-    return _MOTION[number] if number < len(_MOTION) else difference_name(number)
 
 
 def _dump_types() -> dict[str, np.dtype[Any]]:

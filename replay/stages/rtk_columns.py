@@ -8,8 +8,6 @@ import numpy as np
 
 from replay.gnss.measurements import SATELLITE_NAMES, signal_names
 from replay.kernels import rtk_records
-from replay.kernels.gnss_records import SLOTS
-from replay.kernels.rtk_states import NAME_AMBIGUITY, NAME_SLANT, NAME_WET
 from replay.log.columns import Columns
 
 Array = np.ndarray[Any, Any]
@@ -90,13 +88,3 @@ def baseline_columns(rows: Array) -> Columns:
         values[name] = np.ascontiguousarray(rows[field])
         present[name] = np.isfinite(rows[field])
     return Columns.build(rows["t"], values, log_time_ns=rows["log_t"], present=present)
-
-
-def difference_name(number: int) -> str:
-    """Name of a delay or an ambiguity by the number that the filter gives it in a node."""
-    if number >= NAME_AMBIGUITY:
-        satellite, slot = divmod(number - NAME_AMBIGUITY, SLOTS)
-        return f"ambiguity_{SATELLITE_NAMES[satellite].decode()}_{slot + 1}"
-    if number >= NAME_SLANT:
-        return f"ionosphere_{SATELLITE_NAMES[number - NAME_SLANT].decode()}"
-    return ("wet_rover", "wet_base")[number - NAME_WET]

@@ -49,11 +49,11 @@ from replay.stages.rtk import rtk_config
 from replay.stages.rtk_columns import (
     RTK_EVENT_TEXT,
     ambiguity_columns,
-    difference_name,
     resolution_columns,
 )
 from replay.stages.rtk_ins_config import RtkInsConfig
 from replay.stages.spp import single_config
+from replay.stages.state_names import name_of
 from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import EPOCH_READS, EPOCH_TYPES, SAMPLE_TYPES, HeldEpochs, HeldSamples
 
@@ -135,11 +135,7 @@ class RtkInertial:
             rtk_config=rtk_config(config, single_config(config.gnss, config.spp), context),
             filter=records.new_state(_STATES),
             kernel=rtk_records.new_rtk_state(),
-            recorder=Recorder(
-                _STATES,
-                self._record,
-                lambda number: names[number] if number < len(names) else difference_name(number),
-            ),
+            recorder=Recorder(_STATES, self._record, name_of(names, first_slot=1)),
         )
 
     def step(self, state: RtkInsState, block: Block) -> tuple[RtkInsState, Outputs]:

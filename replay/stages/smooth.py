@@ -8,37 +8,36 @@ own, states and covariances at its updates; they bear the log times of the run's
 though nothing of it can be known before the log's end.
 
 What is smoothed are the filter's states: a solution that rests on integers which the filter did
-not feed back is smoothed as the float one that it was to the filter.
+not feed back is smoothed as the float one that it was to the filter. A run that says where the
+receiver is relative to a base gets that smoothed too; where the base moves, and is itself known
+no better than a single receiver is, it gets nothing else.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from replay import channels
 from replay.configuration import Section
-from replay.errors import DataError, MissingChannelError
-from replay.kernels import records, smoother
+from replay.errors import DataError
+from replay.kernels import records
 from replay.kernels.smoothed_rows import smoothed_solutions
-from replay.kernels.transition import GIVEN_INTEGERS, SILENT
-from replay.log.columns import Columns, Ragged, starts
+from replay.kernels.transition import GIVEN_INTEGERS
+from replay.log.columns import Columns, Ragged
 from replay.schemas import solution_pb2
 from replay.stages.base import Block, Context, Outputs, Port, StageSpec, dump_arrays, restore_arrays
 from replay.stages.smooth_config import SmoothConfig
-from replay.stages.spool import Found, Spool
+from replay.stages.smooth_pass import smooth_backwards
+from replay.stages.smoothed_baselines import is_relative, smoothed_baselines
+from replay.stages.spool import Spool
 
 Array = np.ndarray[Any, Any]
 
-_NAVIGATION: Final = 9
 _POSITION: Final = 3
-_WHY: Final = {
-    smoother.OTHER_STATES: "its number of states is not what the node after it goes back to",
-    smoother.OTHER_TIME: "its time is not what the node after it goes back to",
-}
 _STATE_OF: Final = {
     **{
         f"{name}_{axis}": (field, place)
@@ -74,18 +73,25 @@ class Smoother:
         Name of the run that is smoothed.
     inertial : bool
         Whether it says its state (FILTER_STATE).
+    relative : bool
+        Whether it says where the receiver is relative to a base (RELATIVE_POSITION).
     """
 
-    def __init__(self, run: str, inertial: bool) -> None:
-        states = (Port(channels.FILTER_STATE, run=run),) if inertial else ()
-        said = (Port(channels.FILTER_STATE),) if inertial else ()
+    def __init__(self, run: str, inertial: bool, relative: bool = False) -> None:
+        self._inertial = inertial
+        extra = (
+            *((channels.FILTER_STATE,) if inertial else ()),
+            *((channels.RELATIVE_POSITION,) if relative else ()),
+        )
+        read = tuple(Port(channel, run=run) for channel in extra)
+        said = tuple(Port(channel) for channel in extra)
         self.spec = StageSpec(
             name="smooth",
             version=1,
             inputs=(
                 Port(channels.FILTER_TRANSITION, run=run),
                 Port(channels.SOLUTION, run=run),
-                *states,
+                *read,
             ),
             outputs=(*said, Port(channels.FILTER_COVARIANCE), Port(channels.SOLUTION)),
             trigger=Port(channels.FILTER_TRANSITION, run=run),
@@ -98,7 +104,8 @@ class Smoother:
         if context.backwards is None:
             raise TypeError("smooth needs a log that can be read backwards")
         name = channels.FILTER_TRANSITION.name
-        return SmoothState(smooth_backwards(context.backwards(name), context.topics[name]))
+        nodes = context.backwards(name)
+        return SmoothState(smooth_backwards(nodes, context.topics[name], config.smooth.method))
 
     def step(self, state: SmoothState, block: Block) -> tuple[SmoothState, Outputs]:
         """Take a block of nodes and of what the filter said at them."""
@@ -110,24 +117,27 @@ class Smoother:
         if len(said) == 0:
             return state, {}
         at = nodes.take(said)
-        solution = block.get(channels.SOLUTION.name)
-        own = _follow(at.valid_time_ns, solution)
-        if solution is None or len(own) != len(said):
-            raise DataError(
-                f"{len(said) - len(own)} nodes have no solution of their time",
-                where="between log times "
-                f"{int(at.log_time_ns[0])} and {int(at.log_time_ns[-1])} ns",
-                mend="smooth the log as the filter's run wrote it",
-            )
-        own_rows = solution.take(own)
+        own_rows = _own(at, block.get(channels.SOLUTION.name), "solution")
         errors = Ragged(found.error_starts, found.errors).take(said)
         covariances = Ragged(found.covariance_starts, found.covariances).take(said)
         shown = found.shown[said]
         rows, q = _solutions(at, own_rows, errors, covariances, shown)
-        outputs: Outputs = {channels.SOLUTION.name: _solution_columns(at, own_rows, rows)}
+        outputs: Outputs = {}
+        numbers, lists = _names(at)
+        absolute = np.array([not is_relative(names) for names in lists], dtype=np.bool_)[numbers]
+        if channels.RELATIVE_POSITION.name in {port.channel.name for port in self.spec.outputs}:
+            outputs[channels.RELATIVE_POSITION.name] = smoothed_baselines(
+                at, _own(at, block.get(channels.RELATIVE_POSITION.name), "relative position"),
+                own_rows, errors, covariances, shown, absolute,
+            )  # fmt: skip
+        solutions = _solution_columns(at, own_rows, rows)
+        if not absolute.all():
+            solutions = solutions.take(np.flatnonzero(absolute))
+        if len(solutions):
+            outputs[channels.SOLUTION.name] = solutions
         whole = shown == at["dimension"]
         states = block.get(channels.FILTER_STATE.name)
-        if len(self.spec.inputs) == _POSITION:
+        if self._inertial:
             # Where the filter said its state: once for each of its epochs.
             whole &= _marks(at, states)
         whole_rows = np.flatnonzero(whole)
@@ -162,79 +172,23 @@ class Smoother:
         return state
 
 
-def smooth_backwards(slices: Iterator[Columns], where: str) -> Spool:
-    """Go back over all nodes of a run.
-
-    Parameters
-    ----------
-    slices : iterator of Columns of `replay.FilterTransition`
-        The last slice first.
-    where : str
-        For messages.
+def _own(nodes: Columns, rows: Columns | None, what: str) -> Columns:
+    """The run's own row of each node.
 
     Raises
     ------
     DataError
-        Where a node does not follow the one before it: the log lacks some.
+        Where nodes have none.
     """
-    spool = Spool()
-    carry = np.zeros(2, dtype=np.int64)
-    lam, Lam = np.zeros(0), np.zeros((0, 0))
-    for nodes in slices:
-        size = 1 + int(max(nodes["dimension"].max(), nodes["dimension_before"].max(), carry[0]))
-        if size > len(lam):
-            lam, Lam = _grown(lam, size), _grown(Lam, size)
-        found = _room(nodes)
-        parts = {
-            name: (nodes.ragged(name).offsets, nodes.ragged(name).values)
-            for name in ("predicted_upper_triangle", "correction", "updated_upper_triangle")
-        }
-        transition = (
-            nodes.ragged("value").offsets,
-            nodes.ragged("row").values.astype(np.int64),
-            nodes.ragged("column").values.astype(np.int64),
-            nodes.ragged("value").values,
+    place = _follow(nodes.valid_time_ns, rows)
+    if rows is None or len(place) != len(nodes):
+        raise DataError(
+            f"{len(nodes) - len(place)} nodes have no {what} of their time",
+            where="between log times "
+            f"{int(nodes.log_time_ns[0])} and {int(nodes.log_time_ns[-1])} ns",
+            mend="smooth the log as the filter's run wrote it",
         )
-        code = smoother.smooth_nodes(
-            carry, lam, Lam, nodes.valid_time_ns, nodes["since_ns"],
-            nodes["dimension_before"].astype(np.int64), nodes["dimension"].astype(np.int64),
-            found.shown, transition, parts["predicted_upper_triangle"], parts["correction"],
-            parts["updated_upper_triangle"], (found.error_starts, found.errors),
-            (found.covariance_starts, found.covariances),
-        )  # fmt: skip
-        if code != smoother.OK:
-            raise DataError(
-                f"a node does not follow the one before it: {_WHY[code]}",
-                where=f"{where}, log times {int(nodes.log_time_ns[0])} to "
-                f"{int(nodes.log_time_ns[-1])} ns",
-                mend="the run lacks rows: make it again",
-            )
-        spool.put(found)
-    return spool
-
-
-def _grown(array: Array, size: int) -> Array:
-    larger = np.zeros((size,) * array.ndim)
-    larger[tuple(slice(0, n) for n in array.shape)] = array
-    return larger
-
-
-def _room(nodes: Columns) -> Found:
-    """Room for what is asked of each node: all of an update, navigation of other solutions."""
-    dimension = nodes["dimension"].astype(np.int64)
-    lengths = np.diff(nodes.ragged("correction").offsets)
-    asked = nodes["solution"] != SILENT
-    part = np.minimum(dimension, _NAVIGATION)
-    shown = np.where(asked, np.where(lengths > 0, dimension, part), -1).astype(np.int64)
-    error_starts = starts(np.where(asked, dimension, 0).astype(np.int64))
-    covariance_starts = starts(np.where(asked, shown * (shown + 1) // 2, 0).astype(np.int64))
-    return Found(
-        shown,
-        error_starts,
-        np.zeros(error_starts[-1]),
-        covariance_starts,
-        np.zeros(covariance_starts[-1]),
-    )
+    return rows.take(place)
 
 
 def _follow(times: Array, solution: Columns | None) -> Array:
@@ -348,31 +302,3 @@ def _states(nodes: Columns, states: Columns, rows: Array, q: Array, errors: Ragg
             elif name == "squat":
                 values["squat_rad_s2_m"][at] += error
     return Columns.build(nodes.valid_time_ns, values, log_time_ns=nodes.log_time_ns)
-
-
-def find_run(config: SmoothConfig, topics: Collection[str]) -> str:
-    """The run to smooth.
-
-    Raises
-    ------
-    MissingChannelError
-        Where the log has no run that was recorded for smoothing, or not the one asked for.
-    """
-    spec = channels.FILTER_TRANSITION
-    runs = [spec.parts(topic)["run"] for topic in topics if spec.matches(topic)]
-    wanted = config.smooth.run
-    if wanted in runs:
-        return wanted
-    if not wanted and len(runs) == 1:
-        return runs[0]
-    if runs:
-        raise MissingChannelError(
-            f"the log has {', '.join(sorted(runs))} to smooth"
-            + (f", not {wanted}" if wanted else ""),
-            mend=f"choose one: --set smooth.run={sorted(runs)[0]}",
-        )
-    raise MissingChannelError(
-        f"the log has no run that can be smoothed: no channel {spec.topic}",
-        where=f"it has {', '.join(sorted(topics)) or 'none'}",
-        mend="run the filter again with --set smoothing.record=true, and smooth what it writes",
-    )

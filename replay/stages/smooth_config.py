@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from replay.configuration import Section
 
 
@@ -10,6 +12,9 @@ class Smooth(Section, frozen=True):
 
     # A run that was made with `smoothing.record`; empty for the only one that the log has.
     run: str = ""
+    # Rauch-Tung-Striebel, or forward and backward filters combined: the same to rounding, with
+    # more work; there to compare with.
+    method: Literal["rts", "combination"] = "rts"
 
 
 class SmoothConfig(Section, frozen=True):

@@ -14,7 +14,7 @@ from replay.errors import ExitCode, MissingChannelError
 from replay.evaluate.errors_enu import attitude_errors, position_errors, velocity_errors
 from replay.log.backwards import backwards
 from replay.log.reader import LogReader
-from replay.stages.smooth import smooth_backwards
+from replay.stages.smooth_pass import smooth_backwards
 from tests.engine.drives import FULL, PIPELINE, SECOND, TRUTH
 
 RECORD = {"smoothing": {"record": True}}
@@ -217,7 +217,22 @@ def test_rows_come_backwards_as_they_come_forwards(recorded, chunks):
             assert np.array_equal(times, whole.log_time_ns[keep])
 
 
-def test_memory_does_not_grow_with_the_log(recorded):
+def test_forward_and_backward_filters_combined_say_the_same(recorded, smoothed, tmp_path):
+    """Position, velocity, attitude and their deviations; copies of states are singular there."""
+    run(recorded, tmp_path / "combined.mcap", "smooth", {"smooth": {"method": "combination"}})
+    topic = channels.SOLUTION.at(run=SMOOTHED)
+    one, other = read(smoothed, topic), read(tmp_path / "combined.mcap", topic)
+    np.testing.assert_allclose(other["position_ecef_m"], one["position_ecef_m"], atol=1e-6)
+    np.testing.assert_allclose(other["velocity_enu_m_s"], one["velocity_enu_m_s"], atol=1e-7)
+    turned = np.mod(other["attitude_rad"] - one["attitude_rad"] + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(turned).max() < 1e-7
+    for name in ("position_covariance_enu_m2", "velocity_std_enu_m_s", "attitude_std_rad"):
+        scale = np.abs(one[name]).max(axis=1)
+        assert (np.abs(other[name] - one[name]).max(axis=1) / scale).max() < 1e-5
+
+
+@pytest.mark.parametrize("method", ["rts", "combination"])
+def test_memory_does_not_grow_with_the_log(recorded, method):
     """Twice the nodes, the same peak: a slice is in memory, the rest is on disk."""
     with LogReader(recorded) as reader:
         slices = list(backwards(reader, TRANSITION, chunks=1))
@@ -230,7 +245,7 @@ def test_memory_does_not_grow_with_the_log(recorded):
     peaks = []
     for count in (10, 100):
         tracemalloc.start()
-        smooth_backwards((alone for _ in range(count)), "here")
+        smooth_backwards((alone for _ in range(count)), "here", method)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0] + 20_000

@@ -10,6 +10,8 @@ from replay.kernels import ppp, ppp_output, ppp_records, rtk_records, single_poi
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
+from replay.stages.state_names import name_of
+from replay.stages.transitions import Recorder
 
 C_M_S = 299792458.0
 NS = 1_000_000_000
@@ -174,8 +176,17 @@ class Result:
     phases: np.ndarray
 
 
-def run(config, epochs, rows, state=None):
-    """Run the filter over epochs; `state` is that of a run before."""
+def new_recorder(on=True):
+    """What keeps the nodes of a run for a smoother."""
+    return Recorder(ppp_records.ROOM, on, name_of())
+
+
+def run(config, epochs, rows, state=None, recorder=None):
+    """Run the filter over epochs; `state` is that of a run before.
+
+    A recorder that is on keeps its nodes.
+    """
+    recorder = new_recorder(on=False) if recorder is None else recorder
     n = len(rows)
     if state is None:
         state = (
@@ -183,19 +194,27 @@ def run(config, epochs, rows, state=None):
             np.zeros((ppp_records.ROOM, ppp_records.ROOM)),
         )  # fmt: skip
     kernel, x, P = state
-    outs = [
-        np.zeros(len(epochs), dtype=single_point.SINGLE_ROW_DTYPE),
-        np.zeros(8 * n, dtype=single_point.RESIDUAL_DTYPE),
-        np.zeros(3 * n, dtype=rtk_records.AMBIGUITY_ROW_DTYPE),
-        np.zeros(len(epochs), dtype=rtk_records.RESOLUTION_ROW_DTYPE),
-        np.zeros(300 * len(epochs), dtype=NOTE_DTYPE),
-        np.zeros(len(epochs), dtype=ppp_records.ZENITH_ROW_DTYPE),
-        np.zeros(n, dtype=ppp_records.SLANT_ROW_DTYPE),
-        np.zeros(SYSTEMS * SLOTS * len(epochs), dtype=ppp_records.BIAS_ROW_DTYPE),
-        np.zeros(3 * n, dtype=ppp_records.PHASE_ROW_DTYPE),
-    ]
-    counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
-    ppp.run_ppp(kernel, x, P, config, np.zeros(1, dtype=SOLVE_DTYPE), epochs, rows, *outs, counts)
+
+    def call(nodes):
+        outs = [
+            np.zeros(len(epochs), dtype=single_point.SINGLE_ROW_DTYPE),
+            np.zeros(8 * n, dtype=single_point.RESIDUAL_DTYPE),
+            np.zeros(3 * n, dtype=rtk_records.AMBIGUITY_ROW_DTYPE),
+            np.zeros(len(epochs), dtype=rtk_records.RESOLUTION_ROW_DTYPE),
+            np.zeros(300 * len(epochs), dtype=NOTE_DTYPE),
+            np.zeros(len(epochs), dtype=ppp_records.ZENITH_ROW_DTYPE),
+            np.zeros(n, dtype=ppp_records.SLANT_ROW_DTYPE),
+            np.zeros(SYSTEMS * SLOTS * len(epochs), dtype=ppp_records.BIAS_ROW_DTYPE),
+            np.zeros(3 * n, dtype=ppp_records.PHASE_ROW_DTYPE),
+        ]
+        counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
+        ppp.run_ppp(
+            kernel, x, P, config, np.zeros(1, dtype=SOLVE_DTYPE), epochs, rows, *outs, counts,
+            recorder.trail, nodes,
+        )  # fmt: skip
+        return outs, counts
+
+    outs, counts = recorder.run(call, kernel, x, P, recorder.trail)
     places = (0, 2, 3, 4, 5, 6, 7, 8, 9)
     return Result(kernel, x, P, *(out[: counts[k]] for out, k in zip(outs, places, strict=True)))
 

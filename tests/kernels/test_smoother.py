@@ -131,11 +131,13 @@ def columns_of(made, solution=OWN):
     return recorder.columns()
 
 
-def smooth(columns, cuts=()):
+def smooth(columns, cuts=(), kernel=smoother.smooth_nodes):
     """Smoothed estimates and covariances of each node; None where nothing is asked for."""
     edges = [0, *cuts, len(columns)]
-    carry = np.zeros(2, dtype=np.int64)
-    lam, Lam = np.zeros(ROOM), np.zeros((ROOM, ROOM))
+    room = 1 + int(columns["dimension"].max())
+    carry = np.zeros(3, dtype=np.int64)
+    squares = 1 if kernel is smoother.smooth_nodes else 3
+    kept = [np.zeros(room), *(np.zeros((room, room)) for _ in range(squares))]
     found = []
     for begin, end in zip(edges[-2::-1], edges[:0:-1], strict=True):
         part = columns.take(slice(begin, end))
@@ -144,8 +146,8 @@ def smooth(columns, cuts=()):
         x_at = np.concatenate([[0], np.cumsum(n)])
         P_at = np.concatenate([[0], np.cumsum(n * (n + 1) // 2)])
         x, P = np.zeros(x_at[-1]), np.zeros(P_at[-1])
-        code = smoother.smooth_nodes(
-            carry, lam, Lam, part.valid_time_ns, part["since_ns"],
+        code = kernel(
+            carry, *kept, part.valid_time_ns, part["since_ns"],
             part["dimension_before"].astype(np.int64), n, shown,
             (part.ragged("value").offsets, part.ragged("row").values.astype(np.int64),
              part.ragged("column").values.astype(np.int64), part.ragged("value").values),
