@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from rich.console import Console
 
-from tools.bench import formats, gnss, network, ppp, ppp_ins, replaying, simulator, smoother
+from tools.bench import formats, gnss, network, ppp, ppp_ins, replaying, simulator, smoother, sweep
 from tools.bench.row import Row, summary
 
 BENCHES: dict[str, Callable[..., list[Row]]] = {
@@ -29,6 +29,7 @@ BENCHES: dict[str, Callable[..., list[Row]]] = {
     "ppp-ins": ppp_ins.bench_ppp_ins,
     "simulator": simulator.bench_simulator,
     "smoother": smoother.bench_smoother,
+    "sweep": sweep.bench_sweep,
     "importers": formats.bench_importers,
     "elementary": formats.bench_elementary,
 }
