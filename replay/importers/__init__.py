@@ -9,6 +9,7 @@ counted with file and line.
 
 from replay.importers.importer import import_log
 from replay.importers.result import ImportResult, update_expected
-from replay.importers.spec import Spec, load_spec
+from replay.importers.spec import Spec
+from replay.importers.spec_file import load_spec
 
 __all__ = ["ImportResult", "Spec", "import_log", "load_spec", "update_expected"]

@@ -27,7 +27,8 @@ from replay.importers.poll import repeats, steady_times
 from replay.importers.result import ImportResult, compare_digests
 from replay.importers.rtklib_pos import read_pos
 from replay.importers.rtklib_tag import Tag, read_tag
-from replay.importers.spec import Channel, Spec, load_spec
+from replay.importers.spec import Channel, Spec
+from replay.importers.spec_file import load_spec
 from replay.importers.streams import Streams, check_formats, reading_order
 from replay.importers.table import Int64, Mask, Table
 from replay.log.columns import Columns

@@ -266,7 +266,7 @@ _FIFTEEN_DEG = 15.0 * _PI / 180.0
 
 
 @njit(cache=True)
-def _at_latitude(row: tuple[float, ...], latitude: float) -> float:
+def at_latitude(row: tuple[float, ...], latitude: float) -> float:
     """Linear in the absolute latitude (rad) between the columns, constant beyond them."""
     x = latitude / _FIFTEEN_DEG
     if x < 0.0:
@@ -313,12 +313,12 @@ def niell_hydrostatic(
     if latitude < 0.0:
         year += 0.5
     season = cos(_TWO_PI * year)
-    a = _at_latitude(_HYDROSTATIC_MEAN[0], latitude)
-    b = _at_latitude(_HYDROSTATIC_MEAN[1], latitude)
-    c = _at_latitude(_HYDROSTATIC_MEAN[2], latitude)
-    a -= _at_latitude(_HYDROSTATIC_AMPLITUDE[0], latitude) * season
-    b -= _at_latitude(_HYDROSTATIC_AMPLITUDE[1], latitude) * season
-    c -= _at_latitude(_HYDROSTATIC_AMPLITUDE[2], latitude) * season
+    a = at_latitude(_HYDROSTATIC_MEAN[0], latitude)
+    b = at_latitude(_HYDROSTATIC_MEAN[1], latitude)
+    c = at_latitude(_HYDROSTATIC_MEAN[2], latitude)
+    a -= at_latitude(_HYDROSTATIC_AMPLITUDE[0], latitude) * season
+    b -= at_latitude(_HYDROSTATIC_AMPLITUDE[1], latitude) * season
+    c -= at_latitude(_HYDROSTATIC_AMPLITUDE[2], latitude) * season
     s = sin(elevation)
     by_height = 1.0 / s - continued_fraction(s, _HEIGHT[0], _HEIGHT[1], _HEIGHT[2])
     return continued_fraction(s, a, b, c) + by_height * height_m / 1000.0
@@ -329,9 +329,9 @@ def niell_wet(elevation: float, latitude: float) -> float:
     """Wet mapping function of Niell (1996): slant over zenith delay; arguments in rad."""
     return continued_fraction(
         sin(elevation),
-        _at_latitude(_WET[0], latitude),
-        _at_latitude(_WET[1], latitude),
-        _at_latitude(_WET[2], latitude),
+        at_latitude(_WET[0], latitude),
+        at_latitude(_WET[1], latitude),
+        at_latitude(_WET[2], latitude),
     )
 
 

@@ -157,6 +157,29 @@ def enu_axes(x: float, y: float, z: float, out: Array) -> None:
 
 
 @njit(cache=True)
+def local_covariance(axes: Array, P: Array, out: Array) -> None:
+    """Upper triangle of `axes` P `axes`', P being the leading 3 by 3 block.
+
+    Parameters
+    ----------
+    axes : float64 array (3, 3)
+        As :func:`enu_axes` fills them.
+    P : float64 array, ECEF
+    out : float64 array (6,), east, north, up
+        Filled, row after row.
+    """
+    place = 0
+    for a in range(3):
+        for b in range(a, 3):
+            total = 0.0
+            for i in range(3):
+                for j in range(3):
+                    total += axes[a, i] * P[i, j] * axes[b, j]
+            out[place] = total
+            place += 1
+
+
+@njit(cache=True)
 def ecef_from_geodetic(
     sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float, height: float
 ) -> tuple[float, float, float]:

@@ -10,15 +10,14 @@ import numpy as np
 from numba import njit
 
 from replay.kernels.dilution import dilutions
-from replay.kernels.earth import enu_axes
+from replay.kernels.earth import enu_axes, local_covariance
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SYSTEMS
 from replay.kernels.kalman import scalar_update
 from replay.kernels.least_squares import geometric_range, reduced_code
-from replay.kernels.single_point import (
-    KIND_DOPPLER,
-    KIND_PSEUDORANGE,
-    SINGLE_CONFIG_DTYPE,
+from replay.kernels.notes import note_epoch
+from replay.kernels.single_records import KIND_DOPPLER, KIND_PSEUDORANGE, SINGLE_CONFIG_DTYPE
+from replay.kernels.single_solve import (
     free_code,
     free_factor,
     predicted_range_rate,
@@ -74,6 +73,7 @@ EVENT_TOO_FEW: Final = 14
 _WIDE_M2: Final = 1e8
 _WIDE_DRIFT_M2_S2: Final = 1e6
 _NAN = float("nan")
+_NOTES = 2  # in `counts`
 
 
 @njit(cache=True)
@@ -284,7 +284,7 @@ def emit(s: Record, epoch: Record, reference: int, axes: Array, out: Record) -> 
     out["t"] = s["t"]
     out["log_t"] = epoch["log_t"]
     enu_axes(x[0], x[1], x[2], axes)
-    place = 0
+    local_covariance(axes, P, out["cov"])
     for a in range(3):
         out["r"][a] = x[a]
         v, spread = 0.0, 0.0
@@ -294,13 +294,6 @@ def emit(s: Record, epoch: Record, reference: int, axes: Array, out: Record) -> 
                 spread += axes[a, i] * P[3 + i, 3 + j] * axes[a, j]
         out["v_enu"][a] = v
         out["v_std"][a] = sqrt(spread)
-        for b in range(a, 3):
-            total = 0.0
-            for i in range(3):
-                for j in range(3):
-                    total += axes[a, i] * P[i, j] * axes[b, j]
-            out["cov"][place] = total
-            place += 1
     out["has_v"] = 1
     for k in range(SYSTEMS):
         known = s["known"][k] == 1
@@ -324,7 +317,7 @@ def prepare(
         if placed and abs(epoch["clock"] - expected) > cfg["jump"]:
             # The receiver set its clock: all systems' clocks move by as much.
             step = epoch["clock"] - expected
-            _note(notes, counts, epoch, EVENT_CLOCK_JUMP, step)
+            note_epoch(notes, counts, _NOTES, epoch, EVENT_CLOCK_JUMP, -1, step)
             for k in range(SYSTEMS):
                 s["x"][_CLOCK + k] += step
                 s["P"][_CLOCK + k, _CLOCK + k] += 1e4
@@ -336,12 +329,12 @@ def prepare(
             s["t"] = now
             return True
         if -cfg["gap"] <= dt <= 0.0:
-            _note(notes, counts, epoch, EVENT_TIME_BACKWARD, dt)
+            note_epoch(notes, counts, _NOTES, epoch, EVENT_TIME_BACKWARD, -1, dt)
             return False
         if placed:
-            _note(notes, counts, epoch, EVENT_RESET, dt)
+            note_epoch(notes, counts, _NOTES, epoch, EVENT_RESET, -1, dt)
     if not placed:
-        _note(notes, counts, epoch, EVENT_TOO_FEW, float(epoch["used"]))
+        note_epoch(notes, counts, _NOTES, epoch, EVENT_TOO_FEW, -1, float(epoch["used"]))
         return False
     begin(s, epoch)
     begin_trail(trail)
@@ -356,17 +349,6 @@ def first_known(s: Record) -> int:
         if s["known"][k] == 1:
             return k
     return -1
-
-
-@njit(cache=True)
-def _note(notes: Array, counts: Array, epoch: Record, kind: int, value: float) -> None:
-    row = notes[counts[2]]
-    row["t"] = epoch["t"]
-    row["log_t"] = epoch["log_t"]
-    row["kind"] = kind
-    row["satellite"] = -1
-    row["value"] = value
-    counts[2] += 1
 
 
 @njit(cache=True)

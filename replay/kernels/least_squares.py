@@ -189,3 +189,16 @@ def iterate(
         if dx[0] * dx[0] + dx[1] * dx[1] + dx[2] * dx[2] < limit * limit:
             return turn + 1
     return -2
+
+
+@njit(cache=True)
+def reduced_phase(row: Record, slot: int) -> float:
+    """Carrier phase (m) with every modelled term but range, clock and ambiguity taken off."""
+    return (
+        row["phase"][slot]
+        + row["clock"]
+        + row["ionosphere"][slot]
+        - row["hydrostatic"]
+        - row["wet"]
+        - row["shapiro"]
+    )

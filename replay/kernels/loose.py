@@ -9,42 +9,35 @@ from typing import Any
 
 from numba import njit
 
-from replay.kernels.alignment import align_fix, align_sample
-from replay.kernels.constraints import (
-    is_still,
-    non_holonomic_update,
-    push_sample,
-    zero_rate_update,
-    zero_velocity_update,
-)
+from replay.kernels.alignment import align_fix
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
-from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
+from replay.kernels.inertial_samples import (
+    ALIGNING,
+    NOTE_FIX,
+    SKIPPED,
+    all_finite,
+    arrive,
+    begin_sample,
+    end_outage,
+    end_sample,
+    refuse_early,
+    refuse_late,
+    set_out,
+)
 from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution
-from replay.kernels.prediction import advance, remove_sensor_errors
+from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
-    EVENT_IMU_GAP,
     EVENT_NOT_FINITE,
-    EVENT_OUTAGE_BEGIN,
-    EVENT_OUTAGE_END,
     EVENT_REJECTED,
     EVENT_RESET,
-    EVENT_STOP_BEGIN,
-    EVENT_STOP_END,
-    EVENT_TIME_BACKWARD,
     RUNNING,
-    STATUS_OUTAGE,
-    STATUS_PREDICTED,
     STATUS_UPDATED,
 )
 from replay.kernels.tdcp_link import begin_chain, ready_to_align, use_link
-from replay.kernels.transition import OWN, SILENT, begin_trail
+from replay.kernels.transition import OWN, begin_trail
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event
-
-NOTE_IMU = 0
-NOTE_FIX = 1
-NOTE_EARLY = 2
 
 
 @njit(cache=True)
@@ -85,12 +78,7 @@ def _use_fix(
         if force:
             record_event(events, counts, t, log_t, EVENT_RESET, float(s["rejected"]), NOTE_FIX)
         s["rejected"] = 0
-        if s["in_outage"] == 1:
-            record_event(
-                events, counts, t, log_t, EVENT_OUTAGE_END, (t - s["fix_t"]) * 1e-9, NOTE_FIX
-            )
-            s["in_outage"] = 0
-        s["fix_t"] = t
+        end_outage(s, t, log_t, events, counts)
     else:
         s["rejected"] += 1
         record_event(events, counts, t, log_t, EVENT_REJECTED, float(s["rejected"]), NOTE_FIX)
@@ -101,62 +89,6 @@ def _use_fix(
         close_inertial(s, cfg, work, log_t, OWN, nodes)
     emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
     emit_epoch(s, cfg, log_t, epochs, covariances, counts)
-
-
-@njit(cache=True)
-def constrain(
-    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Any, ...]
-) -> None:
-    """Stops and non-holonomic updates at an inertial sample."""
-    innovations, events, counts = out[3], out[4], out[5]
-    interval = cfg["stop_interval"]
-    if (cfg["zero_velocity"] == 1 or cfg["zero_rate"] == 1) and (
-        t - s["stop_last"]
-    ) * 1e-9 >= interval - 1e-6:
-        s["stop_last"] = t
-        v = s["nav"]["v"]
-        speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        still = speed <= cfg["stop_speed"] and is_still(s, cfg, work, True)
-        if still != (s["stopped"] == 1):
-            kind = EVENT_STOP_BEGIN if still else EVENT_STOP_END
-            record_event(events, counts, t, log_t, kind, speed, NOTE_IMU)
-            s["stopped"] = 1 if still else 0
-        if still:
-            if cfg["zero_velocity"] == 1:
-                zero_velocity_update(s, cfg, work, t, log_t, innovations, counts)
-            if cfg["zero_rate"] == 1:
-                zero_rate_update(s, cfg, work, t, log_t, innovations, counts)
-    if (
-        cfg["non_holonomic"] == 1
-        and s["stopped"] == 0
-        and (t - s["nhc_last"]) * 1e-9 >= cfg["nhc_interval"] - 1e-6
-    ):
-        s["nhc_last"] = t
-        non_holonomic_update(s, cfg, work, t, log_t, innovations, counts)
-
-
-@njit(cache=True)
-def say_where(
-    s: Record, cfg: Record, work: Record, t: int, log_t: int, out: tuple[Any, ...]
-) -> None:
-    """A predicted solution where one is due; a node for the smoother there, or after an update."""
-    slot = t // cfg["solution_interval"]
-    shown = SILENT
-    status = STATUS_OUTAGE if s["in_outage"] == 1 else STATUS_PREDICTED
-    if slot > s["emitted_slot"]:
-        s["emitted_slot"] = slot
-        shown = OWN
-        emit_solution(s, work, status, log_t, out[0], out[5])
-    trail = work["trail"]
-    if trail["on"] == 1 and (shown == OWN or trail["updated"] == 1):
-        close_inertial(s, cfg, work, log_t, shown, out[6])
-
-
-@njit(cache=True)
-def all_finite(a: Array) -> bool:
-    """Whether three numbers are neither NaN nor infinite."""
-    total = a[0] + a[1] + a[2]
-    return total - total == 0.0
 
 
 @njit(cache=True)
@@ -187,35 +119,25 @@ def _take_fixes(
             elif (fix["chain"] == 0 or ready_to_align(s, fix)) and align_fix(
                 s, cfg, work, fix, log_t, events, counts
             ):
-                s["fix_t"] = fix["t"]
-                mark_epoch(s, fix)
+                set_out(s, fix)
                 if recorded:
                     begin_trail(work["trail"])
                     close_inertial(s, cfg, work, log_t, OWN, out[6])
                 if fix["chain"] > 0:
                     begin_chain(s, cfg, work, fix)
                     s["chain_t"] = fix["t"]
-                s["stop_last"] = fix["t"]
-                s["nhc_last"] = fix["t"]
                 emit_solution(s, work, STATUS_UPDATED, log_t, solutions, counts)
                 emit_epoch(s, cfg, log_t, out[1], out[2], counts)
             continue
         if fix["t"] < s["t"] or fix["t"] == s["moved_t"]:
-            late = (s["t"] - fix["t"]) * 1e-9
-            record_event(events, counts, fix["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
+            refuse_late(s, fix["t"], fix["t"], log_t, events, counts)
             continue
-        if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
-            # The last word before help arrives: this is where drift is read off.
-            emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
-            if recorded:
-                close_inertial(s, cfg, work, log_t, OWN, out[6])
-        advance(s, cfg, work, fix["t"])
+        arrive(s, cfg, work, fix["t"], log_t, out)
         if fix["chain"] > 0:
             use_link(s, cfg, work, fix, log_t, out)
         else:
             _use_fix(s, cfg, work, fix, log_t, out)
-    if early > 0:
-        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, float(early), NOTE_EARLY)
+    refuse_early(early, t, log_t, events, counts)
     return k
 
 
@@ -273,41 +195,10 @@ def run_block(
     out = (solutions, epochs, covariances, innovations, events, counts, nodes)
     taken = 0
     for k in range(imu_t.shape[0]):
-        t = imu_t[k]
-        log_t = imu_log_t[k]
-        if not (all_finite(imu_w[k]) and all_finite(imu_f[k])):
-            record_event(events, counts, t, log_t, EVENT_NOT_FINITE, 0.0, NOTE_IMU)
+        t, log_t = imu_t[k], imu_log_t[k]
+        begun = begin_sample(s, cfg, work, t, log_t, imu_w[k], imu_f[k], out)
+        if begun == SKIPPED:
             continue
-        if s["imu_t"] < 0:
-            s["imu_t"] = t
-            s["t"] = t
-            continue
-        if t <= s["imu_t"]:
-            late = (s["imu_t"] - t) * 1e-9
-            record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, late, NOTE_IMU)
-            continue
-        dt = (t - s["imu_t"]) * 1e-9
-        if dt > cfg["imu_gap"]:
-            record_event(events, counts, t, log_t, EVENT_IMU_GAP, dt, NOTE_IMU)
-        w_raw, f_raw = s["w_raw"], s["f_raw"]
-        for i in range(3):
-            w_raw[i] = imu_w[k, i]
-            f_raw[i] = imu_f[k, i]
-        aligning = s["mode"] != RUNNING
-        if aligning:
-            align_sample(s, cfg, work, dt, t, log_t, events, counts)
         taken = _take_fixes(s, cfg, work, fixes, taken, t, log_t, out)
-        s["imu_t"] = t
-        if s["mode"] != RUNNING:
-            s["t"] = t
-            continue
-        since = (t - s["fix_t"]) * 1e-9
-        if s["in_outage"] == 0 and since > cfg["outage_limit"]:
-            s["in_outage"] = 1
-            record_event(events, counts, t, log_t, EVENT_OUTAGE_BEGIN, since, NOTE_FIX)
-        advance(s, cfg, work, t)
-        if not aligning:
-            push_sample(s, w_raw, f_raw)
-        constrain(s, cfg, work, t, log_t, out)
-        say_where(s, cfg, work, t, log_t, out)
+        end_sample(s, cfg, work, t, log_t, begun == ALIGNING, out)
     return taken

@@ -11,13 +11,12 @@ import numpy as np
 from numba import njit
 
 from replay.kernels._gpt import COEFFICIENTS
-from replay.kernels.atmosphere import vapour_pressure, zenith_hydrostatic, zenith_wet
+from replay.kernels.atmosphere import at_latitude, vapour_pressure, zenith_hydrostatic, zenith_wet
 from replay.kernels.elementary import cos, pow, sin, sincos, sqrt
 from replay.kernels.spherical_harmonics import spherical_harmonics
 
 _TWO_PI: Final = 6.283185307179586
 _YEAR_DAYS: Final = 365.25
-_FIFTEEN_DEG: Final = 0.2617993877991494
 _KELVIN: Final = 273.15
 
 # RTCA DO-229D, table A-2: pressure (hPa), temperature (K), vapour pressure (hPa), lapse rate
@@ -49,21 +48,6 @@ _GPT_DAY: Final = 44266.0  # 28 January 1980 as modified Julian date, counted fr
 
 
 @njit(cache=True)
-def _between(row: tuple[float, ...], latitude: float) -> float:
-    """Linear in the absolute latitude (rad) between the columns, constant beyond them."""
-    x = latitude / _FIFTEEN_DEG
-    if x < 0.0:
-        x = -x
-    if x <= 1.0:
-        return row[0]
-    if x >= 5.0:
-        return row[4]
-    i = int(x)
-    f = x - i
-    return row[i - 1] * (1.0 - f) + row[i] * f
-
-
-@njit(cache=True)
 def mops_surface(latitude: float, day: float) -> tuple[float, float, float, float, float]:
     """Meteorology at the level of the sea (RTCA DO-229D, A.4.2.4).
 
@@ -82,11 +66,11 @@ def mops_surface(latitude: float, day: float) -> tuple[float, float, float, floa
     start = _MINIMUM_NORTH_DAY if latitude >= 0.0 else _MINIMUM_SOUTH_DAY
     wave = cos(_TWO_PI * (day - start) / _YEAR_DAYS)
     return (
-        _between(_MEAN[0], latitude) - _between(_WAVE[0], latitude) * wave,
-        _between(_MEAN[1], latitude) - _between(_WAVE[1], latitude) * wave,
-        _between(_MEAN[2], latitude) - _between(_WAVE[2], latitude) * wave,
-        _between(_MEAN[3], latitude) - _between(_WAVE[3], latitude) * wave,
-        _between(_MEAN[4], latitude) - _between(_WAVE[4], latitude) * wave,
+        at_latitude(_MEAN[0], latitude) - at_latitude(_WAVE[0], latitude) * wave,
+        at_latitude(_MEAN[1], latitude) - at_latitude(_WAVE[1], latitude) * wave,
+        at_latitude(_MEAN[2], latitude) - at_latitude(_WAVE[2], latitude) * wave,
+        at_latitude(_MEAN[3], latitude) - at_latitude(_WAVE[3], latitude) * wave,
+        at_latitude(_MEAN[4], latitude) - at_latitude(_WAVE[4], latitude) * wave,
     )
 
 

@@ -16,6 +16,7 @@ from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.dilution import dilutions
 from replay.kernels.earth import enu_axes
 from replay.kernels.gnss_records import SATELLITES, SLOTS
+from replay.kernels.integers import ATTEMPT_DTYPE, CANDIDATE_DTYPE
 from replay.kernels.ppp_measures import add_doppler, build_measures, view_rows
 from replay.kernels.ppp_output import (
     COUNTS,
@@ -48,9 +49,8 @@ from replay.kernels.ppp_states import begin_again, leading_states, predict
 from replay.kernels.ppp_update import count_used, mark_satellites, settle, update_epoch
 from replay.kernels.rtk_output import note, write_solution
 from replay.kernels.rtk_records import FIXED, FLOAT, SINGLE
-from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE
 from replay.kernels.rtk_states import heed_breaks
-from replay.kernels.single_point import true_time
+from replay.kernels.single_solve import true_time
 from replay.kernels.state_names import name_precise
 from replay.kernels.transition import (
     GIVEN_INTEGERS,

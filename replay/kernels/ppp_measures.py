@@ -15,7 +15,7 @@ from numba import njit
 
 from replay.kernels.elementary import sin, sincos
 from replay.kernels.gnss_records import SLOTS
-from replay.kernels.least_squares import geometric_range, reduced_code
+from replay.kernels.least_squares import geometric_range, reduced_code, reduced_phase
 from replay.kernels.ppp_records import (
     CODE,
     DOPPLER,
@@ -27,8 +27,7 @@ from replay.kernels.ppp_records import (
     VIEWS,
 )
 from replay.kernels.ppp_states import SECOND, ionosphere_factor
-from replay.kernels.single_point import predicted_range_rate
-from replay.kernels.tight_update import reduced_phase
+from replay.kernels.single_solve import predicted_range_rate
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import noise_factor
 

@@ -14,19 +14,21 @@ from numba import njit
 from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import GLONASS, SATELLITES, SLOTS, SYSTEMS
+from replay.kernels.integers import (
+    DONE,
+    clear_attempt,
+    difference_floats,
+    hold,
+    keep_integers,
+    next_try,
+    same_integers,
+    search_integers,
+)
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.ppp_lanes import find_lanes, fix_lanes, integers_of, keep_known
 from replay.kernels.ppp_records import HOLD, PHASE
 from replay.kernels.rtk_output import write_ambiguities, write_resolution
 from replay.kernels.rtk_records import PARTIAL_NONE
-from replay.kernels.rtk_resolve import (
-    clear_attempt,
-    difference_floats,
-    hold,
-    keep_integers,
-    same_integers,
-    search_integers,
-)
 from replay.kernels.types import Array, Record
 
 # Cycles: a phase whose own deviation is more tells no integer.
@@ -199,50 +201,28 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
 
 
 @njit(cache=True)
-def _try(
-    measures: Array, total: int, views: Array, rows: Array, s: Record, cfg: Record, x: Array,
-    P: Array, left_out: Array, candidates: Array, out: Record,
-) -> int:  # fmt: skip
-    """One attempt without some satellites; its candidates."""
-    count = find_candidates(measures, total, views, rows, s, cfg, left_out, candidates)
-    return attempt(candidates, count, x, P, cfg, out)
-
-
-@njit(cache=True)
 def _search(
     measures: Array, total: int, views: Array, rows: Array, s: Record, cfg: Record, x: Array,
     P: Array, candidates: Array, tries: Array,
 ) -> int:  # fmt: skip
     """Try all candidates; where they fail, leave out satellites one after another.
 
-    The newest ambiguity goes first, among those of one age the lowest satellite. The
-    attempt is in ``tries[0]``, that with all candidates where none passed.
+    Which ones :func:`replay.kernels.integers.next_try` tells. The attempt is in ``tries[0]``,
+    that with all candidates where none passed.
     """
     left_out = np.zeros(SATELLITES, dtype=np.int64)
-    count = _try(measures, total, views, rows, s, cfg, x, P, left_out, candidates, tries[0])
-    if tries[0]["passed"] == 1 or cfg["partial"] == PARTIAL_NONE:
-        return count
-    for _ in range(cfg["drops"]):
-        worst, lowest, young = -1, 0.0, 0
-        for k in range(total):
-            m = measures[k]
-            if left_out[m["satellite"]] == 1 or not _eligible(m, views, rows, s, cfg):
-                continue
-            elevation = views[m["pair"]]["elevation"]
-            age = min(s["lock"][m["satellite"], m["slot"]], cfg["proven"])
-            if worst < 0 or age < young or (age == young and elevation < lowest):
-                worst, lowest, young = m["satellite"], elevation, age
-        if worst < 0:
-            break
-        left_out[worst] = 1
-        count = _try(measures, total, views, rows, s, cfg, x, P, left_out, candidates, tries[1])
-        if count < cfg["least"]:
-            break
-        if tries[1]["passed"] == 1:
-            tries[0] = tries[1]
-            return count
-    left_out[:] = 0
-    return _try(measures, total, views, rows, s, cfg, x, P, left_out, candidates, tries[0])
+    eligible = np.zeros(total, dtype=np.int64)
+    for k in range(total):
+        eligible[k] = 1 if _eligible(measures[k], views, rows, s, cfg) else 0
+    drops = 0 if cfg["partial"] == PARTIAL_NONE else cfg["drops"]
+    count, turn = 0, 0
+    while turn != DONE:
+        count = find_candidates(measures, total, views, rows, s, cfg, left_out, candidates)
+        count = attempt(candidates, count, x, P, cfg, tries[1 if turn > 0 else 0])
+        turn = next_try(
+            measures, total, views, eligible, s, cfg, drops, count, turn, left_out, tries
+        )
+    return count
 
 
 @njit(cache=True)

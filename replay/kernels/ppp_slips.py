@@ -14,8 +14,9 @@ from numba import njit
 
 from replay.kernels.elementary import sin
 from replay.kernels.gnss_records import SATELLITES, SLOTS
+from replay.kernels.median import median
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
-from replay.kernels.slips import median, wide_lane
+from replay.kernels.slips import wide_lane
 from replay.kernels.types import Array, Record
 
 _RATE_GAIN: Final = 0.3

@@ -15,26 +15,14 @@ from numba import njit
 
 from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.dilution import dilutions
-from replay.kernels.double_difference import (
-    build_measures,
-    pair_rows,
-    residuals,
-    use_group,
-    worst_measure,
-)
+from replay.kernels.double_difference import build_measures, pair_rows
 from replay.kernels.earth import enu_axes
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
-from replay.kernels.kalman import scalar_update, whitened_update
+from replay.kernels.integers import ATTEMPT_DTYPE, CANDIDATE_DTYPE
+from replay.kernels.kalman import scalar_update
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
-from replay.kernels.rtk_output import (
-    note,
-    write_ambiguities,
-    write_baseline,
-    write_residuals,
-    write_resolution,
-    write_solution,
-)
+from replay.kernels.rtk_output import note, write_baseline, write_residuals, write_solution
 from replay.kernels.rtk_records import (
     DGNSS,
     EVENT_BASE_LOST,
@@ -48,22 +36,13 @@ from replay.kernels.rtk_records import (
     HOLD,
     KINEMATIC,
     MEASURE_DTYPE,
-    MEASURE_STATES,
     PAIR_DTYPE,
     PAIRS,
     ROOM,
     SINGLE,
     VELOCITY,
 )
-from replay.kernels.rtk_resolve import (
-    ATTEMPT_DTYPE,
-    CANDIDATE_DTYPE,
-    fixed_unit_weight,
-    hold,
-    keep_integers,
-    resolve_epoch,
-    same_integers,
-)
+from replay.kernels.rtk_resolve import resolve
 from replay.kernels.rtk_states import (
     compare_frequencies,
     heed_breaks,
@@ -71,7 +50,9 @@ from replay.kernels.rtk_states import (
     name_states,
     predict,
 )
-from replay.kernels.single_point import SINGLE_STATE_DTYPE, solve_epoch, solve_velocity, true_time
+from replay.kernels.rtk_update import heed_base, satellite_differences, settle, update_epoch
+from replay.kernels.single_records import SINGLE_STATE_DTYPE
+from replay.kernels.single_solve import solve_epoch, solve_velocity, true_time
 from replay.kernels.state_names import BASELINE
 from replay.kernels.transition import (
     GIVEN_INTEGERS,
@@ -85,10 +66,8 @@ from replay.kernels.transition import (
 )
 from replay.kernels.types import Array, Record
 
-_ROUNDS = 12
 _FAR_M = 20.0
 _LEAST_DIFFERENCES = 4
-_APART_SIGMAS = 4.0
 # Largest part of a baseline's length that its deviation may be for the length to be used.
 _SURE_PART = 0.1
 
@@ -127,68 +106,6 @@ def _own_position(
 
 
 @njit(cache=True)
-def update_epoch(
-    measures: Array, starts: Array, groups: int, A: Array, n: int, cfg: Record,
-    velocity: Array, velocity_cov: Array, x: Array, P: Array, dx: Array,
-) -> int:  # fmt: skip
-    """Use all measurements that agree; those that do not are left out, the worst one first.
-
-    Parameters
-    ----------
-    measures : array of MEASURE_DTYPE
-    starts : int64 array
-    groups : int
-    A : float64 array (n, n)
-        Predicted covariance; its last state is room for a clock.
-    n : int
-    cfg : record of RTK_CONFIG_DTYPE
-    velocity : float64 array (3,), m/s, ECEF
-        NaN where there is none, or no velocity among the states.
-    velocity_cov : float64 array (3, 3)
-    x : float64 array
-        Predicted states.
-    P : float64 array (n, n)
-        Filled.
-    dx : float64 array (n,)
-        Filled.
-
-    Returns
-    -------
-    int
-        Measurements left out.
-    """
-    total = starts[groups]
-    h, index = np.zeros(MEASURE_STATES + 1), np.zeros(MEASURE_STATES + 1, dtype=np.int64)
-    b, gain = np.zeros(n), np.zeros(n)
-    dropped = 0
-    while True:
-        for i in range(n):
-            dx[i] = 0.0
-            for j in range(n):
-                P[i, j] = A[i, j]
-        if velocity[0] == velocity[0]:
-            H, z = np.zeros((3, 3)), np.zeros(3)
-            for c in range(3):
-                index[c] = 3 + c
-                H[c, c] = 1.0
-                z[c] = velocity[c] - x[3 + c]
-            whitened_update(
-                P, n, H, index, 3, z, velocity_cov, 3, dx, np.zeros((3, 3)), np.zeros((3, 8)),
-                b, gain,
-            )  # fmt: skip
-        for group in range(groups):
-            use_group(measures, starts[group], starts[group + 1], P, n, dx, h, index, b, gain)
-        residuals(measures, starts, groups, P, n, dx, b, gain)
-        if dropped == _ROUNDS:
-            return dropped
-        worst = worst_measure(measures, total, cfg["code_gate"], cfg["phase_gate"])
-        if worst < 0:
-            return dropped
-        measures[worst]["use"] = 0
-        dropped += 1
-
-
-@njit(cache=True)
 def _constrain_length(
     x: Array, P: Array, n: int, base_x: Array, cfg: Record, trail: Record
 ) -> None:
@@ -210,79 +127,6 @@ def _constrain_length(
         x[i] += dx[i]
     if trail["on"] == 1:
         add_correction(trail, dx, n)
-
-
-@njit(cache=True)
-def believe(
-    measures: Array, candidates: Array, count: int, s: Record, cfg: Record, tried: Record,
-    x: Array, P: Array, before: Array, base_x: Array,
-) -> bool:  # fmt: skip
-    """Whether integers that passed the test of the search agree with all else."""
-    if tried["passed"] == 0:
-        return False
-    step = np.zeros(3)
-    for c in range(3):
-        spread = P[c, c] - tried["cov"][c, c]
-        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
-        if not abs(tried["x"][c] - x[c]) <= limit:
-            return False
-        step[c] = tried["x"][c] - before[c]
-    if cfg["length"] > 0.0:
-        length2 = 0.0
-        for c in range(3):
-            length2 += (tried["x"][c] - base_x[c]) * (tried["x"][c] - base_x[c])
-        if not abs(sqrt(length2) - cfg["length"]) <= 0.02 + 4.0 * cfg["length_sigma"]:
-            return False
-    if tried["whole"] == 0:
-        return True
-    if s["wet"] < 0 and cfg["ionosphere"] == 0:
-        unit = fixed_unit_weight(measures, candidates, count, before, step)
-        if unit > cfg["unit_weight"]:
-            return False
-    if same_integers(candidates, count, s):
-        s["doubt"] = 0
-        s["proof"] += 1
-    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
-        s["doubt"] += 1
-        return False
-    else:
-        s["doubt"] = 0
-        s["proof"] = 0
-    keep_integers(candidates, count, s)
-    return True
-
-
-@njit(cache=True)
-def settle(measures: Array, total: int, s: Record) -> int:
-    """Count epochs in use and rejections of each ambiguity; the number of phases in use."""
-    phases = 0
-    for k in range(total):
-        m = measures[k]
-        if m["kind"] == 1:
-            satellite, slot = m["satellite"], m["slot"]
-            if m["use"] == 1:
-                phases += 1
-                s["lock"][satellite, slot] += 1
-                s["rejected"][satellite, slot] = 0
-            else:
-                s["rejected"][satellite, slot] += 1
-                s["lock"][satellite, slot] = 0
-                s["known"][satellite, slot] = 0
-    return phases
-
-
-@njit(cache=True)
-def heed_base(epochs: Array, rows: Array, until: int, span: int, s: Record) -> None:
-    """Breaks of all base epochs since the one looked at last, those not used too.
-
-    Those that are `span` (ns) older than the one in use are past caring.
-    """
-    begin = epochs[until]["t"] - span
-    for j in range(until + 1):
-        if epochs[j]["t"] > s["base_t"] and epochs[j]["t"] >= begin:
-            first = epochs[j]["first"]
-            heed_breaks(rows[first : first + epochs[j]["count"]], 1, s)
-            s["base_t"] = epochs[j]["t"]
 
 
 @njit(cache=True)
@@ -355,56 +199,6 @@ def _record_prediction(
                 carry_rate(trail, 3 + c, 6 + c, dt)
     name_states(s, lead, 0, trail["name"])
     open_node(trail, A, n)
-
-
-@njit(cache=True)
-def _resolve(
-    part: Array, measures: Array, total: int, pairs: Array, s: Record, cfg: Record, x: Array,
-    P: Array, before: Array, base_x: Array, candidates: Array, tries: Array, t: int, log_t: int,
-    ambiguities: Array, resolutions: Array, counts: Array, trail: Record,
-) -> bool:  # fmt: skip
-    """The integers of an epoch; whether they are believed."""
-    count = resolve_epoch(measures, total, pairs, part, s, cfg, x, P, candidates, tries)
-    tried = tries[0]
-    if tried["count"] == 0:
-        return False
-    fixed = believe(measures, candidates, count, s, cfg, tried, x, P, before, base_x)
-    held = False
-    if fixed and cfg["mode"] == HOLD and s["fixed"] + 1 >= cfg["hold_count"]:
-        held = tried["whole"] == 1
-    write_ambiguities(
-        candidates, count, measures, pairs, part, tried["whole"] == 1, fixed, held, t, log_t,
-        ambiguities, counts,
-    )  # fmt: skip
-    write_resolution(tried, cfg["threshold"], fixed, held, t, log_t, resolutions, counts)
-    if held:
-        n = s["n"]
-        was = x[:n].copy()
-        hold(candidates, count, x, P, n, cfg)
-        if trail["on"] == 1:
-            add_correction(trail, x[:n] - was, n)
-    return fixed
-
-
-@njit(cache=True)
-def satellite_differences(measures: Array, total: int, pairs: Array) -> int:
-    """Satellites in use less the systems that they are of: what a position needs three of.
-
-    Frequencies do not count: they see the same direction.
-    """
-    seen = np.zeros(SATELLITES, dtype=np.int64)
-    systems = np.zeros(SYSTEMS, dtype=np.int64)
-    count = 0
-    for k in range(total):
-        m = measures[k]
-        if m["use"] == 1 and seen[m["satellite"]] == 0:
-            seen[m["satellite"]] = 1
-            count += 1
-            system = pairs[m["pair"]]["system"]
-            if systems[system] == 0:
-                systems[system] = 1
-                count -= 1
-    return count
 
 
 @njit(cache=True)
@@ -531,7 +325,7 @@ def run_rtk(
             status = FLOAT if phases >= _LEAST_DIFFERENCES else DGNSS
             tries[0]["fixed"] = 0
             tried = status == FLOAT and cfg["mode"] != FLOAT_ONLY
-            if tried and _resolve(
+            if tried and resolve(
                 part, measures, total, pairs, s, cfg, x, P, before, base_x, candidates, tries,
                 t, log_t, ambiguities, resolutions, counts, trail,
             ):  # fmt: skip

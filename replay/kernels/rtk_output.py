@@ -2,16 +2,17 @@
 
 from numba import njit
 
-from replay.kernels.earth import enu_axes
+from replay.kernels.earth import enu_axes, local_covariance
 from replay.kernels.elementary import atan2, sqrt
 from replay.kernels.gnss_records import SYSTEMS
+from replay.kernels.notes import append_note
 from replay.kernels.rtk_records import (
     AMBIGUITY_FIXED,
     AMBIGUITY_FLOAT,
     AMBIGUITY_HELD,
     AMBIGUITY_REJECTED,
 )
-from replay.kernels.single_point import KIND_PSEUDORANGE
+from replay.kernels.single_records import KIND_PSEUDORANGE
 from replay.kernels.types import Array, Record
 
 _KIND_PHASE = 8
@@ -23,13 +24,7 @@ def note(
     notes: Array, counts: Array, t: int, log_t: int, kind: int, satellite: int, value: float
 ) -> None:
     """One event (NOTE_DTYPE)."""
-    row = notes[counts[5]]
-    counts[5] += 1
-    row["t"] = t
-    row["log_t"] = log_t
-    row["kind"] = kind
-    row["satellite"] = satellite
-    row["value"] = value
+    append_note(notes, counts, 5, t, log_t, kind, satellite, value)
 
 
 @njit(cache=True)
@@ -103,20 +98,6 @@ def write_resolution(
 
 
 @njit(cache=True)
-def _local_covariance(axes: Array, P: Array, out: Array) -> None:
-    """Upper triangle of `axes` P `axes`', P being the leading 3 by 3 block."""
-    place = 0
-    for a in range(3):
-        for b in range(a, 3):
-            total = 0.0
-            for i in range(3):
-                for j in range(3):
-                    total += axes[a, i] * P[i, j] * axes[b, j]
-            out[place] = total
-            place += 1
-
-
-@njit(cache=True)
 def write_solution(
     out: Record, epoch: Record, t: int, log_t: int, status: int, position: Array, cov: Array,
     v: Array, velocity_cov: Array, moves: bool, work: Record,
@@ -129,7 +110,7 @@ def write_solution(
     out["status"] = status
     for i in range(3):
         out["r"][i] = position[i]
-    _local_covariance(axes, cov, out["cov"])
+    local_covariance(axes, cov, out["cov"])
     out["has_v"] = 1 if moves else 0
     for a in range(3):
         if moves:
@@ -170,7 +151,7 @@ def write_baseline(
         out["enu"][a] = (
             axes[a, 0] * out["ecef"][0] + axes[a, 1] * out["ecef"][1] + axes[a, 2] * out["ecef"][2]
         )
-    _local_covariance(axes, cov, out["cov"])
+    local_covariance(axes, cov, out["cov"])
     e, n, up = out["enu"][0], out["enu"][1], out["enu"][2]
     ee, en, eu = out["cov"][0], out["cov"][1], out["cov"][2]
     nn, nu, uu = out["cov"][3], out["cov"][4], out["cov"][5]

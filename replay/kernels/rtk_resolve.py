@@ -10,52 +10,28 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from replay.kernels.ambiguity import COUNT_LIMIT, OK, bootstrapped_success
-from replay.kernels.ambiguity_search import resolve, resolve_partial, w_ratio
+from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import GLONASS, SATELLITES, SLOTS, SYSTEMS
-from replay.kernels.kalman import scalar_update
+from replay.kernels.integers import (
+    DONE,
+    clear_attempt,
+    difference_floats,
+    hold,
+    keep_integers,
+    next_try,
+    same_integers,
+    search_integers,
+)
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
-from replay.kernels.rtk_records import PARTIAL_ELEVATION, PARTIAL_SUCCESS, TEST_W_RATIO
+from replay.kernels.rtk_output import write_ambiguities, write_resolution
+from replay.kernels.rtk_records import HOLD, PARTIAL_ELEVATION
+from replay.kernels.transition import add_correction
 from replay.kernels.types import Array, Record
 
-_NODES: Final = 20_000
-_LARGEST_RATIO: Final = 9999.9
 # Cycles: a phase whose own deviation is more tells no integer.
 _BLUR: Final = 0.25
-
-CANDIDATE_DTYPE: Final = np.dtype(
-    [
-        ("measure", "<i8"),
-        ("satellite", "<i8"),
-        ("reference", "<i8"),  # satellite
-        ("slot", "<i8"),
-        ("state", "<i8"),
-        ("base", "<i8"),  # state of the reference
-        ("wavelength", "<f8"),  # m
-        ("elevation", "<f8"),  # rad
-        ("value", "<f8"),  # cycle
-        ("variance", "<f8"),  # cycle^2
-        ("integer", "<i8"),
-    ],
-    align=True,
-)
-
-# What an attempt at the integers gave.
-ATTEMPT_DTYPE: Final = np.dtype(
-    [
-        ("count", "<i8"),
-        ("fixed", "<i8"),
-        ("ratio", "<f8"),
-        ("w_ratio", "<f8"),
-        ("success", "<f8"),
-        ("passed", "<i8"),
-        ("whole", "<i8"),  # 1 where every candidate has an integer
-        ("x", "<f8", 3),  # m, ECEF, position given the integers
-        ("cov", "<f8", (3, 3)),  # m^2, ECEF
-    ],
-    align=True,
-)
+_APART_SIGMAS: Final = 4.0
 
 
 @njit(cache=True)
@@ -115,91 +91,6 @@ def find_candidates(
 
 
 @njit(cache=True)
-def difference_floats(
-    candidates: Array, count: int, x: Array, P: Array, a: Array, Q: Array, Qx: Array
-) -> None:
-    """Float double differences (cycle), their covariance, and that with the position.
-
-    Parameters
-    ----------
-    candidates : array of CANDIDATE_DTYPE
-    count : int
-    x, P
-        States and covariance.
-    a, Q, Qx : float64 arrays (count,), (count, count), (3, count)
-        Filled; `Qx` in m cycle.
-    """
-    for i in range(count):
-        p, q = candidates[i]["state"], candidates[i]["base"]
-        scale = 1.0 / candidates[i]["wavelength"]
-        a[i] = (x[p] - x[q]) * scale
-        for j in range(i + 1):
-            u, v = candidates[j]["state"], candidates[j]["base"]
-            value = (P[p, u] - P[p, v]) - (P[q, u] - P[q, v])
-            value *= scale / candidates[j]["wavelength"]
-            Q[i, j] = value
-            Q[j, i] = value
-        for c in range(3):
-            Qx[c, i] = (P[c, p] - P[c, q]) * scale
-        candidates[i]["value"] = a[i]
-        candidates[i]["variance"] = Q[i, i]
-
-
-@njit(cache=True)
-def condition(
-    miss: Array, Qx: Array, L: Array, D: Array, Zt: Array, first: int, x: Array, P: Array,
-    out: Record,
-) -> None:  # fmt: skip
-    """Position and covariance given that z = Zt a has integers from `first` on.
-
-    Parameters
-    ----------
-    miss : float64 array (n,)
-        Float less integer, decorrelated, from `first` on.
-    Qx : float64 array (3, n)
-        Covariance of the position with the ambiguities.
-    L, D, Zt
-        Zt Q Zt' = L' D L.
-    x, P
-        Float states and covariance; the position comes first.
-    out : record of ATTEMPT_DTYPE
-    """
-    n = D.shape[0]
-    w = np.empty((4, n))
-    for k in range(n - 1, first - 1, -1):
-        for c in range(4):
-            value = miss[k] if c == 3 else 0.0
-            if c < 3:
-                for i in range(n):
-                    value += Qx[c, i] * Zt[k, i]
-            for i in range(k + 1, n):
-                value -= L[i, k] * w[c, i]
-            w[c, k] = value
-    for c in range(3):
-        value = x[c]
-        for k in range(first, n):
-            value -= w[c, k] * w[3, k] / D[k]
-        out["x"][c] = value
-        for d in range(3):
-            value = P[c, d]
-            for k in range(first, n):
-                value -= w[c, k] * w[d, k] / D[k]
-            out["cov"][c, d] = value
-
-
-@njit(cache=True)
-def clear_attempt(out: Record, count: int) -> None:
-    """An attempt at so many candidates that has found nothing."""
-    out["count"] = count
-    out["fixed"] = 0
-    out["passed"] = 0
-    out["whole"] = 0
-    out["ratio"] = 0.0
-    out["w_ratio"] = 0.0
-    out["success"] = 0.0
-
-
-@njit(cache=True)
 def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out: Record) -> None:
     """Search for the integers of some candidates and test the best ones.
 
@@ -227,83 +118,14 @@ def attempt(candidates: Array, count: int, x: Array, P: Array, cfg: Record, out:
 
 
 @njit(cache=True)
-def search_integers(
-    a: Array, Q: Array, Qx: Array, x: Array, P: Array, cfg: Record, integers: Array, out: Record
-) -> None:
-    """Search for the integers of float ambiguities, test the best ones, give the position then.
-
-    Parameters
-    ----------
-    a, Q, Qx : float64 arrays (n,), (n, n), (3, n)
-        Ambiguities (cycle), their covariance, that of the position with them (m cycle).
-    x, P
-        Float states and covariance; the position comes first.
-    cfg : record
-        With `partial`, `success`, `test`, `threshold` and `least` of RTK_CONFIG_DTYPE.
-    integers : int64 array (n,)
-        Filled where all are known (`whole`).
-    out : record of ATTEMPT_DTYPE
-        Cleared by :func:`clear_attempt`; filled.
-    """
-    count = a.shape[0]
-    fixed, norms = np.zeros((2, count), dtype=np.int64), np.zeros(2)
-    L, D = np.zeros((count, count)), np.zeros(count)
-    Zt = np.zeros((count, count), dtype=np.int64)
-    inverse = np.zeros((count, count), dtype=np.int64)
-    first = 0
-    if cfg["partial"] == PARTIAL_SUCCESS:
-        conditional, covariance = np.zeros(count), np.zeros((count, count))
-        status, first, separation = resolve_partial(
-            a, Q, cfg["success"], _NODES, fixed, norms, conditional, covariance, L, D, Zt, inverse
-        )
-    else:
-        status, separation = resolve(a, Q, _NODES, fixed, norms, L, D, Zt, inverse)
-    if status != OK:
-        return
-    out["ratio"] = _LARGEST_RATIO
-    if norms[0] * _LARGEST_RATIO > norms[1]:
-        out["ratio"] = norms[1] / norms[0]
-    out["w_ratio"] = w_ratio(norms[0], norms[1], separation)
-    out["success"] = bootstrapped_success(D, first)
-    statistic = out["w_ratio"] if cfg["test"] == TEST_W_RATIO else out["ratio"]
-    sure = statistic >= cfg["threshold"] and out["success"] >= cfg["success"]
-    miss = np.zeros(count)
-    for k in range(first, count):
-        total = 0.0
-        for i in range(count):
-            total += Zt[k, i] * a[i]
-        if cfg["partial"] == PARTIAL_SUCCESS:
-            # Candidates of a partial search are combinations already.
-            miss[k] = total - fixed[0, k]
-        else:
-            whole = 0
-            for i in range(count):
-                whole += Zt[k, i] * fixed[0, i]
-            miss[k] = total - whole
-    condition(miss, Qx, L, D, Zt, first, x, P, out)
-    if first == 0:
-        out["whole"] = 1
-        for i in range(count):
-            value = fixed[0, i]
-            if cfg["partial"] == PARTIAL_SUCCESS:
-                value = 0
-                for k in range(count):
-                    value += fixed[0, k] * inverse[k, i]
-            integers[i] = value
-    if sure and count - first >= cfg["least"]:
-        out["passed"] = 1
-        out["fixed"] = count - first
-
-
-@njit(cache=True)
 def resolve_epoch(
     measures: Array, total: int, pairs: Array, rover: Array, s: Record, cfg: Record,
     x: Array, P: Array, candidates: Array, tries: Array,
 ) -> int:  # fmt: skip
     """Try all candidates; where they fail, leave out satellites one after another.
 
-    The newest ambiguity goes first, among those of one age the lowest satellite. The
-    attempt is in ``tries[0]`` (ATTEMPT_DTYPE), that with all candidates where none passed.
+    Which ones :func:`replay.kernels.integers.next_try` tells. The attempt is in ``tries[0]``
+    (ATTEMPT_DTYPE), that with all candidates where none passed.
 
     Returns
     -------
@@ -311,34 +133,17 @@ def resolve_epoch(
         Candidates of the attempt.
     """
     left_out = np.zeros(SATELLITES, dtype=np.int64)
-    count = find_candidates(measures, total, pairs, rover, s, cfg, left_out, candidates)
-    attempt(candidates, count, x, P, cfg, tries[0])
-    if tries[0]["passed"] == 1 or cfg["partial"] != PARTIAL_ELEVATION:
-        return count
-    for _ in range(cfg["drops"]):
-        worst, lowest, young = -1, 0.0, 0
-        for k in range(total):
-            m = measures[k]
-            satellite = m["satellite"]
-            if m["kind"] == 0 or m["use"] == 0 or left_out[satellite] == 1:
-                continue
-            elevation = pairs[m["pair"]]["elevation"]
-            age = min(s["lock"][satellite, m["slot"]], cfg["proven"])
-            if worst < 0 or age < young or (age == young and elevation < lowest):
-                worst, lowest, young = satellite, elevation, age
-        if worst < 0:
-            break
-        left_out[worst] = 1
+    eligible = np.zeros(total, dtype=np.int64)
+    for k in range(total):
+        eligible[k] = 1 if measures[k]["kind"] != 0 and measures[k]["use"] != 0 else 0
+    drops = cfg["drops"] if cfg["partial"] == PARTIAL_ELEVATION else 0
+    count, turn = 0, 0
+    while turn != DONE:
         count = find_candidates(measures, total, pairs, rover, s, cfg, left_out, candidates)
-        if count < cfg["least"]:
-            break
-        attempt(candidates, count, x, P, cfg, tries[1])
-        if tries[1]["passed"] == 1:
-            tries[0] = tries[1]
-            return count
-    left_out[:] = 0
-    count = find_candidates(measures, total, pairs, rover, s, cfg, left_out, candidates)
-    attempt(candidates, count, x, P, cfg, tries[0])
+        attempt(candidates, count, x, P, cfg, tries[1 if turn > 0 else 0])
+        turn = next_try(
+            measures, total, pairs, eligible, s, cfg, drops, count, turn, left_out, tries
+        )
     return count
 
 
@@ -412,59 +217,69 @@ def _reference(measures: Array, satellite: int, slot: int) -> int:
 
 
 @njit(cache=True)
-def same_integers(candidates: Array, count: int, s: Record) -> bool:
-    """Whether the integers agree with the last ones of the same satellites.
-
-    References may have changed: of each group the integers may differ by one number.
-    """
-    begin = 0
-    while begin < count:
-        base, slot = candidates[begin]["base"], candidates[begin]["slot"]
-        reference = candidates[begin]["reference"]
-        known = s["known"][reference, slot] == 1
-        offset = -s["integer"][reference, slot] if known else 0
-        i = begin
-        while i < count and candidates[i]["base"] == base:
-            satellite = candidates[i]["satellite"]
-            if s["known"][satellite, slot] == 1:
-                gap = candidates[i]["integer"] - s["integer"][satellite, slot]
-                if not known:
-                    known = True
-                    offset = gap
-                if gap != offset:
-                    return False
-            i += 1
-        begin = i
+def believe(
+    measures: Array, candidates: Array, count: int, s: Record, cfg: Record, tried: Record,
+    x: Array, P: Array, before: Array, base_x: Array,
+) -> bool:  # fmt: skip
+    """Whether integers that passed the test of the search agree with all else."""
+    if tried["passed"] == 0:
+        return False
+    step = np.zeros(3)
+    for c in range(3):
+        spread = P[c, c] - tried["cov"][c, c]
+        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
+        if not abs(tried["x"][c] - x[c]) <= limit:
+            return False
+        step[c] = tried["x"][c] - before[c]
+    if cfg["length"] > 0.0:
+        length2 = 0.0
+        for c in range(3):
+            length2 += (tried["x"][c] - base_x[c]) * (tried["x"][c] - base_x[c])
+        if not abs(sqrt(length2) - cfg["length"]) <= 0.02 + 4.0 * cfg["length_sigma"]:
+            return False
+    if tried["whole"] == 0:
+        return True
+    if s["wet"] < 0 and cfg["ionosphere"] == 0:
+        unit = fixed_unit_weight(measures, candidates, count, before, step)
+        if unit > cfg["unit_weight"]:
+            return False
+    if same_integers(candidates, count, s):
+        s["doubt"] = 0
+        s["proof"] += 1
+    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
+        s["doubt"] += 1
+        return False
+    else:
+        s["doubt"] = 0
+        s["proof"] = 0
+    keep_integers(candidates, count, s)
     return True
 
 
 @njit(cache=True)
-def keep_integers(candidates: Array, count: int, s: Record) -> None:
-    """Remember the integers of an epoch; a reference has zero."""
-    for satellite in range(SATELLITES):
-        for slot in range(SLOTS):
-            s["known"][satellite, slot] = 0
-    for i in range(count):
-        c = candidates[i]
-        s["integer"][c["satellite"], c["slot"]] = c["integer"]
-        s["known"][c["satellite"], c["slot"]] = 1
-        s["integer"][c["reference"], c["slot"]] = 0
-        s["known"][c["reference"], c["slot"]] = 1
-
-
-@njit(cache=True)
-def hold(candidates: Array, count: int, x: Array, P: Array, n: int, cfg: Record) -> None:
-    """Feed the integers back as measurements of the ambiguities."""
-    h, index = np.zeros(2), np.zeros(2, dtype=np.int64)
-    b, gain, dx = np.zeros(n), np.zeros(n), np.zeros(n)
-    for i in range(count):
-        c = candidates[i]
-        if not c["elevation"] >= cfg["hold_mask"]:
-            continue
-        weight = 1.0 / (cfg["hold_sigma"] * c["wavelength"])
-        index[0], index[1] = c["state"], c["base"]
-        h[0], h[1] = weight, -weight
-        z = c["wavelength"] * c["integer"] - (x[c["state"]] - x[c["base"]])
-        scalar_update(P, n, h, index, 2, weight * z, dx, b, gain)
-    for i in range(n):
-        x[i] += dx[i]
+def resolve(
+    part: Array, measures: Array, total: int, pairs: Array, s: Record, cfg: Record, x: Array,
+    P: Array, before: Array, base_x: Array, candidates: Array, tries: Array, t: int, log_t: int,
+    ambiguities: Array, resolutions: Array, counts: Array, trail: Record,
+) -> bool:  # fmt: skip
+    """The integers of an epoch; whether they are believed."""
+    count = resolve_epoch(measures, total, pairs, part, s, cfg, x, P, candidates, tries)
+    tried = tries[0]
+    if tried["count"] == 0:
+        return False
+    fixed = believe(measures, candidates, count, s, cfg, tried, x, P, before, base_x)
+    held = False
+    if fixed and cfg["mode"] == HOLD and s["fixed"] + 1 >= cfg["hold_count"]:
+        held = tried["whole"] == 1
+    write_ambiguities(
+        candidates, count, measures, pairs, part, tried["whole"] == 1, fixed, held, t, log_t,
+        ambiguities, counts,
+    )  # fmt: skip
+    write_resolution(tried, cfg["threshold"], fixed, held, t, log_t, resolutions, counts)
+    if held:
+        n = s["n"]
+        was = x[:n].copy()
+        hold(candidates, count, x, P, n, cfg)
+        if trail["on"] == 1:
+            add_correction(trail, x[:n] - was, n)
+    return fixed

@@ -21,6 +21,7 @@ from replay.kernels.gnss_records import (
     SYSTEMS,
 )
 from replay.kernels.least_squares import geometric_range
+from replay.kernels.notes import append_note
 from replay.kernels.orbits import (
     SPEED_OF_LIGHT_M_S,
     clock_polynomial,
@@ -228,13 +229,7 @@ def note(
 ) -> None:
     """Append one event; beyond the room that there is, only count it."""
     if counts[0] < notes.shape[0]:
-        row = notes[counts[0]]
-        row["t"] = t
-        row["log_t"] = log_t
-        row["kind"] = kind
-        row["satellite"] = sat
-        row["value"] = value
-        counts[0] += 1
+        append_note(notes, counts, 0, t, log_t, kind, sat, value)
     else:
         counts[1] += 1
 

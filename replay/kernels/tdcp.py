@@ -9,12 +9,16 @@ import numpy as np
 from numba import njit
 
 from replay.kernels.dilution import dilutions
-from replay.kernels.earth import enu_axes
+from replay.kernels.earth import enu_axes, local_covariance
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
+from replay.kernels.notes import note_epoch
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
-from replay.kernels.single_point import EVENT_EXCLUDED, true_time
-from replay.kernels.slips import TIME_DIFFERENCE, append_slip, detect_slips
+from replay.kernels.single_records import EVENT_EXCLUDED
+from replay.kernels.single_solve import true_time
+from replay.kernels.slip_records import TIME_DIFFERENCE
+from replay.kernels.slips import append_slip, detect_slips
+from replay.kernels.tdcp_adjust import FOUND, PHASE_DTYPE, REPAIRED, USED
 from replay.kernels.tdcp_difference import differences, refer
 from replay.kernels.tdcp_records import (
     EVENT_CHAIN_BROKEN,
@@ -26,34 +30,10 @@ from replay.kernels.tdcp_records import (
     STATUS_PREDICTED,
     STATUS_SINGLE,
 )
-from replay.kernels.tdcp_solve import FOUND, PHASE_DTYPE, REPAIRED, USED, solve_displacement
+from replay.kernels.tdcp_solve import solve_displacement
 from replay.kernels.types import Array, Record
 
-
-@njit(cache=True)
-def note(notes: Array, counts: Array, epoch: Record, kind: int, sat: int, value: float) -> None:
-    """Append one event."""
-    row = notes[counts[4]]
-    counts[4] += 1
-    row["t"] = epoch["t"]
-    row["log_t"] = epoch["log_t"]
-    row["kind"] = kind
-    row["satellite"] = sat
-    row["value"] = value
-
-
-@njit(cache=True)
-def _to_local(P: Array, axes: Array, out: Array) -> None:
-    """Upper triangle in east, north, up of a covariance (3, 3) in ECEF."""
-    place = 0
-    for a in range(3):
-        for b in range(a, 3):
-            total = 0.0
-            for i in range(3):
-                for j in range(3):
-                    total += axes[a, i] * P[i, j] * axes[b, j]
-            out[place] = total
-            place += 1
+_NOTES = 4  # in `counts`
 
 
 @njit(cache=True)
@@ -71,7 +51,7 @@ def _emit_place(
     for i in range(3):
         out["r"][i] = s["place"][i]
     enu_axes(s["place"][0], s["place"][1], s["place"][2], axes)
-    _to_local(s["P"], axes, out["cov"])
+    local_covariance(axes, s["P"], out["cov"])
 
 
 @njit(cache=True)
@@ -140,11 +120,11 @@ def _tell_phases(
             slips[slip_count[0] - 1]["repaired"] = 1 if used else 0
         if used:
             if p["taken"] != 0.0:
-                note(notes, counts, epoch, EVENT_SLIP_REPAIRED, sat, p["taken"])
+                note_epoch(notes, counts, _NOTES, epoch, EVENT_SLIP_REPAIRED, sat, p["taken"])
         elif p["state"] == FOUND:
-            note(notes, counts, epoch, EVENT_EXCLUDED, sat, p["size"])
+            note_epoch(notes, counts, _NOTES, epoch, EVENT_EXCLUDED, sat, p["size"])
         else:
-            note(notes, counts, epoch, EVENT_CYCLE_SLIP, sat, p["size"])
+            note_epoch(notes, counts, _NOTES, epoch, EVENT_CYCLE_SLIP, sat, p["size"])
 
 
 @njit(cache=True)
@@ -194,7 +174,7 @@ def _link(
     out_d["since"] = s["true_t"]
     out_d["count"] = status
     out_d["unit"] = unit
-    _to_local(P, axes, out_d["cov"])
+    local_covariance(axes, P, out_d["cov"])
     for i in range(3):
         moved = x[i] - s["x"][i]
         out_d["d"][i] = moved
@@ -276,7 +256,9 @@ def run_tdcp(
         first_slip = slip_count[0]
         jump = detect_slips(s["slips"], slip_cfg, epoch, part, broken, slips, slip_count, buffer)
         if jump != 0.0:
-            note(notes, counts, epoch, EVENT_CLOCK_JUMP, -1, jump / SPEED_OF_LIGHT_M_S * 1e3)
+            note_epoch(
+                notes, counts, _NOTES, epoch, EVENT_CLOCK_JUMP, -1, jump / SPEED_OF_LIGHT_M_S * 1e3
+            )
         _remember_breaks(s, part, broken)
         if epoch["placed"] == 0:
             continue
@@ -332,7 +314,7 @@ def _step(
             refer(s, epoch, rows, true_t, nought, u)
             return
         lasted = (s["solved_t"] - s["begin_t"]) * 1e-9
-        note(notes, counts, epoch, EVENT_CHAIN_BROKEN, -1, lasted)
+        note_epoch(notes, counts, _NOTES, epoch, EVENT_CHAIN_BROKEN, -1, lasted)
         s["t"] = -1
     if epoch["age"] != 0.0:
         return

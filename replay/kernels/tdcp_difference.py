@@ -13,28 +13,15 @@ from numba import njit
 
 from replay.kernels.elementary import sin
 from replay.kernels.gnss_records import SATELLITES, SLOTS
-from replay.kernels.least_squares import geometric_range
+from replay.kernels.least_squares import geometric_range, reduced_phase
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
-from replay.kernels.single_point import predicted_range_rate
-from replay.kernels.slips import CONTINUOUS, NEW
-from replay.kernels.tdcp_solve import SUSPECTED, USED
+from replay.kernels.single_solve import predicted_range_rate
+from replay.kernels.slip_records import CONTINUOUS, NEW
+from replay.kernels.tdcp_adjust import SUSPECTED, USED
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import noise_factor
 
 _NAN = float("nan")
-
-
-@njit(cache=True)
-def _modelled(row: Record, slot: int) -> float:
-    """Phase with every modelled term but range and receiver clock taken off (m)."""
-    return (
-        row["phase"][slot]
-        + row["clock"]
-        + row["ionosphere"][slot]
-        - row["hydrostatic"]
-        - row["wet"]
-        - row["shapiro"]
-    )
 
 
 @njit(cache=True)
@@ -102,7 +89,7 @@ def differences(
             p["slot"] = slot
             p["system"] = row["system"]
             p["wavelength"] = SPEED_OF_LIGHT_M_S / row["frequency"][slot]
-            p["z"] = _modelled(row, slot) - s["phase"][sat, slot] + step
+            p["z"] = reduced_phase(row, slot) - s["phase"][sat, slot] + step
             noise = cfg["phase_sigma"] * cfg["phase_sigma"]
             noise *= 2.0 * noise_factor(cfg["weight"]["model"], row["elevation"], row["cn0"][slot])
             drift = cfg["drift_sigma"] * dt / sin(row["elevation"])
@@ -132,5 +119,5 @@ def refer(s: Record, epoch: Record, rows: Array, true_t: int, nought: Array, u: 
         s["issue"][sat] = row["issue"]
         for slot in range(SLOTS):
             if row["phase"][slot] == row["phase"][slot]:
-                s["phase"][sat, slot] = _modelled(row, slot) - distance
+                s["phase"][sat, slot] = reduced_phase(row, slot) - distance
                 s["signal"][sat, slot] = row["signal"][slot]

@@ -14,11 +14,11 @@ from numba import njit
 from replay.kernels.covariance import ATTITUDE, POSITION, VELOCITY
 from replay.kernels.earth import enu_axes
 from replay.kernels.gnss_update import mark_epoch, position_update, velocity_update
+from replay.kernels.inertial_samples import NOTE_FIX, end_outage
 from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution, name_extras
 from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
     AXIS_EAST,
-    EVENT_OUTAGE_END,
     EVENT_REJECTED,
     EVENT_RESET,
     LINK_EACH,
@@ -33,7 +33,6 @@ from replay.kernels.update import fill_covariance, record_event, state_count, up
 
 KIND_DISPLACEMENT: Final = 11
 CLONE_STATES: Final = 3
-_NOTE_FIX = 1
 
 
 @njit(cache=True)
@@ -156,16 +155,12 @@ def _link(
     used = displacement_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     if not used:
         s["rejected"] += 1
-        record_event(events, counts, t, log_t, EVENT_REJECTED, float(s["rejected"]), _NOTE_FIX)
+        record_event(events, counts, t, log_t, EVENT_REJECTED, float(s["rejected"]), NOTE_FIX)
         return False
     if force:
-        record_event(events, counts, t, log_t, EVENT_RESET, float(s["rejected"]), _NOTE_FIX)
+        record_event(events, counts, t, log_t, EVENT_RESET, float(s["rejected"]), NOTE_FIX)
     s["rejected"] = 0
-    if s["in_outage"] == 1:
-        since = (t - s["fix_t"]) * 1e-9
-        record_event(events, counts, t, log_t, EVENT_OUTAGE_END, since, _NOTE_FIX)
-        s["in_outage"] = 0
-    s["fix_t"] = t
+    end_outage(s, t, log_t, events, counts)
     if fix["has_v"] == 1 and cfg["use_velocity"] == 1:
         velocity_update(s, cfg, work, fix, force, t, log_t, innovations, counts)
     return True

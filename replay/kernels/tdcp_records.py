@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from replay.kernels.gnss_records import SATELLITES, SLOTS
-from replay.kernels.slips import SLIP_STATE_DTYPE, new_slip_state
+from replay.kernels.slip_records import SLIP_STATE_DTYPE, new_slip_state
 
 KIND_TIME_DIFFERENCED: Final = 10
 EVENT_CYCLE_SLIP: Final = 16

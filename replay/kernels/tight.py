@@ -11,61 +11,45 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from replay.kernels.alignment import align_fix, align_sample
-from replay.kernels.constraints import push_sample
+from replay.kernels.alignment import align_fix
+from replay.kernels.antenna_measures import antenna
 from replay.kernels.covariance import POSITION, VELOCITY
 from replay.kernels.dilution import dilutions
-from replay.kernels.earth import enu_axes
+from replay.kernels.earth import enu_axes, local_covariance
 from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SYSTEMS
-from replay.kernels.gnss_update import mark_epoch
-from replay.kernels.loose import (
-    NOTE_EARLY,
+from replay.kernels.inertial_samples import (
+    ALIGNING,
     NOTE_FIX,
-    NOTE_IMU,
-    all_finite,
-    constrain,
-    say_where,
+    SKIPPED,
+    arrive,
+    begin_sample,
+    end_outage,
+    end_sample,
+    refuse_early,
+    refuse_late,
+    set_out,
 )
 from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution, name_extras
-from replay.kernels.prediction import advance, remove_sensor_errors
+from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
-    EVENT_IMU_GAP,
-    EVENT_NOT_FINITE,
-    EVENT_OUTAGE_BEGIN,
-    EVENT_OUTAGE_END,
     EVENT_REJECTED,
     EVENT_RESET,
-    EVENT_TIME_BACKWARD,
     FIX_DTYPE,
     RUNNING,
-    STATUS_OUTAGE,
     STATUS_PREDICTED,
     STATUS_UPDATED,
 )
-from replay.kernels.single_point import (
-    SINGLE_STATE_DTYPE,
-    solve_epoch,
-    solve_velocity,
-    true_time,
-)
+from replay.kernels.single_records import SINGLE_STATE_DTYPE
+from replay.kernels.single_solve import solve_epoch, solve_velocity, true_time
+from replay.kernels.tight_phases import remember, use_phase_changes
 from replay.kernels.tight_records import CLOCK, DRIFT, PHASE_EXTRA, PLAIN_EXTRA
-from replay.kernels.tight_update import (
-    antenna,
-    meet_clocks,
-    remember,
-    use_codes,
-    use_dopplers,
-    use_phase_changes,
-)
+from replay.kernels.tight_update import meet_clocks, use_codes, use_dopplers
 from replay.kernels.transition import OWN, begin_trail, carry_rate
 from replay.kernels.types import Array, Record
 from replay.kernels.update import record_event, state_count, total_count
 
 EVENT_CLOCK_JUMP = 21
-SKIPPED = 0
-ALIGNING = 1
-NAVIGATING = 2
 _NAN = float("nan")
 _EARTH_M = 6378137.0
 
@@ -148,15 +132,7 @@ def single_fix(
         if solve["column"][k] > 0:
             clock = p["clock"][k]
     N, axes = solve["N"], solve["axes"]
-    place = 0
-    for a in range(3):
-        for b in range(a, 3):
-            total = 0.0
-            for i in range(3):
-                for j in range(3):
-                    total += axes[a, i] * N[i, j] * axes[b, j]
-            fix["R"][place] = total
-            place += 1
+    local_covariance(axes, N, fix["R"])
     fix["t"] = true_time(epoch["t"], clock)
     fix["log_t"] = epoch["log_t"]
     drift = solve_velocity(rows, weight, tcfg["single"], p, solve, v, u)
@@ -296,12 +272,7 @@ def use_epoch(
     else:
         g["refused"] = 0
     if used > 0:
-        if s["in_outage"] == 1:
-            record_event(
-                events, counts, t, log_t, EVENT_OUTAGE_END, (t - s["fix_t"]) * 1e-9, NOTE_FIX
-            )
-            s["in_outage"] = 0
-        s["fix_t"] = t
+        end_outage(s, t, log_t, events, counts)
     # What is said of the epoch was known when the sample after it came, not before.
     for k in range(first, tally[0]):
         residuals[k]["log_t"] = log_t
@@ -330,7 +301,7 @@ def _take_epochs(
     out: tuple[Any, ...],
 ) -> int:
     """Use every epoch up to an inertial sample at `t`; the number of the next one."""
-    solutions, events, counts = out[0], out[4], out[5]
+    events, counts = out[4], out[5]
     k = first
     early = 0
     while k < epochs.shape[0] and epochs[k]["log_t"] <= log_t:
@@ -346,26 +317,16 @@ def _take_epochs(
             if fix["t"] < s["imu_t"]:
                 early += 1
             elif align_fix(s, cfg, work, fix, log_t, events, counts):
-                s["fix_t"] = fix["t"]
-                mark_epoch(s, fix)
-                s["stop_last"] = fix["t"]
-                s["nhc_last"] = fix["t"]
+                set_out(s, fix)
                 _begin(s, g, cfg, tcfg, work)
                 use_epoch(s, g, cfg, tcfg, work, epoch, part, solve, room, log_t, out)
             continue
         if at < s["t"]:
-            late = (s["t"] - at) * 1e-9
-            record_event(events, counts, epoch["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
+            refuse_late(s, at, epoch["t"], log_t, events, counts)
             continue
-        if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
-            # The last word before help arrives: this is where drift is read off.
-            emit_solution(s, work, STATUS_OUTAGE, log_t, solutions, counts)
-            if work["trail"]["on"] == 1:
-                close_inertial(s, cfg, work, log_t, OWN, out[6])
-        advance(s, cfg, work, at)
+        arrive(s, cfg, work, at, log_t, out)
         use_epoch(s, g, cfg, tcfg, work, epoch, part, solve, room, log_t, out)
-    if early > 0:
-        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, float(early), NOTE_EARLY)
+    refuse_early(early, t, log_t, events, counts)
     return k
 
 
@@ -434,61 +395,3 @@ def run_tight(
         )  # fmt: skip
         end_sample(s, cfg, work, imu_t[k], imu_log_t[k], state_of == ALIGNING, out)
     return taken
-
-
-@njit(cache=True)
-def begin_sample(
-    s: Record,
-    cfg: Record,
-    work: Record,
-    t: int,
-    log_t: int,
-    rate: Array,
-    force: Array,
-    out: tuple[Any, ...],
-) -> int:
-    """Take an inertial sample at hand: SKIPPED, ALIGNING or NAVIGATING."""
-    events, counts = out[4], out[5]
-    if not (all_finite(rate) and all_finite(force)):
-        record_event(events, counts, t, log_t, EVENT_NOT_FINITE, 0.0, NOTE_IMU)
-        return SKIPPED
-    if s["imu_t"] < 0:
-        s["imu_t"] = t
-        s["t"] = t
-        return SKIPPED
-    if t <= s["imu_t"]:
-        late = (s["imu_t"] - t) * 1e-9
-        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, late, NOTE_IMU)
-        return SKIPPED
-    dt = (t - s["imu_t"]) * 1e-9
-    if dt > cfg["imu_gap"]:
-        record_event(events, counts, t, log_t, EVENT_IMU_GAP, dt, NOTE_IMU)
-    w_raw, f_raw = s["w_raw"], s["f_raw"]
-    for i in range(3):
-        w_raw[i] = rate[i]
-        f_raw[i] = force[i]
-    if s["mode"] == RUNNING:
-        return NAVIGATING
-    align_sample(s, cfg, work, dt, t, log_t, events, counts)
-    return ALIGNING
-
-
-@njit(cache=True)
-def end_sample(
-    s: Record, cfg: Record, work: Record, t: int, log_t: int, aligning: bool, out: tuple[Any, ...]
-) -> None:
-    """Carry the filter to the sample's time: outage, constraints, a predicted solution."""
-    events, counts = out[4], out[5]
-    s["imu_t"] = t
-    if s["mode"] != RUNNING:
-        s["t"] = t
-        return
-    since = (t - s["fix_t"]) * 1e-9
-    if s["in_outage"] == 0 and since > cfg["outage_limit"]:
-        s["in_outage"] = 1
-        record_event(events, counts, t, log_t, EVENT_OUTAGE_BEGIN, since, NOTE_FIX)
-    advance(s, cfg, work, t)
-    if not aligning:
-        push_sample(s, s["w_raw"], s["f_raw"])
-    constrain(s, cfg, work, t, log_t, out[:7])
-    say_where(s, cfg, work, t, log_t, out[:7])

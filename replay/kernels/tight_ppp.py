@@ -15,9 +15,17 @@ from numba import njit
 from replay.kernels.alignment import align_fix
 from replay.kernels.ambiguity import COUNT_LIMIT
 from replay.kernels.gnss_records import SATELLITES, SLOTS
-from replay.kernels.gnss_update import mark_epoch
-from replay.kernels.loose import NOTE_EARLY, NOTE_FIX
-from replay.kernels.output_rows import close_inertial, emit_solution
+from replay.kernels.inertial_samples import (
+    ALIGNING,
+    SKIPPED,
+    arrive,
+    begin_sample,
+    end_sample,
+    refuse_early,
+    refuse_late,
+    set_out,
+)
+from replay.kernels.integers import ATTEMPT_DTYPE, CANDIDATE_DTYPE
 from replay.kernels.ppp_records import (
     MEASURES,
     PPP_MEASURE_DTYPE,
@@ -25,22 +33,13 @@ from replay.kernels.ppp_records import (
     VIEW_DTYPE,
     VIEWS,
 )
-from replay.kernels.prediction import advance, remove_sensor_errors
+from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
-    EVENT_TIME_BACKWARD,
     FIX_DTYPE,
     RUNNING,
-    STATUS_OUTAGE,
 )
-from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE
 from replay.kernels.rtk_states import heed_breaks, heed_late
-from replay.kernels.single_point import true_time
-from replay.kernels.tight import (
-    ALIGNING,
-    SKIPPED,
-    begin_sample,
-    end_sample,
-)
+from replay.kernels.single_solve import true_time
 from replay.kernels.tight_ppp_begin import join, plain_epoch
 from replay.kernels.tight_ppp_epoch import say_epoch, use_epoch
 from replay.kernels.tight_ppp_measures import heading_of
@@ -51,11 +50,10 @@ from replay.kernels.tight_ppp_states import (
     name_states,
 )
 from replay.kernels.transition import (
-    OWN,
     begin_trail,
 )
 from replay.kernels.types import Array, Record
-from replay.kernels.update import record_event, state_count
+from replay.kernels.update import state_count
 
 _LEAST_PHASES: Final = 4
 _SET_ANEW_M: Final = 3000.0
@@ -121,10 +119,7 @@ def _take_epochs(
                 continue
             if not align_fix(s, cfg, work, fix, log_t, events, counts):
                 continue
-            s["fix_t"] = fix["t"]
-            mark_epoch(s, fix)
-            s["stop_last"] = fix["t"]
-            s["nhc_last"] = fix["t"]
+            set_out(s, fix)
             g["clock_t"] = s["t"]
             g["heading"] = heading_of(s["nav"]["C"], solve["axes"])
             g["turn"] = 0.0
@@ -132,19 +127,13 @@ def _take_epochs(
             _take_over(s, q, cfg, pcfg, work, room)
         elif at < s["t"] or (q["t"] >= 0 and epoch["t"] <= q["t"]):
             heed_late(part, q)
-            late = (s["t"] - at) * 1e-9
-            record_event(events, counts, epoch["t"], log_t, EVENT_TIME_BACKWARD, late, NOTE_FIX)
+            refuse_late(s, at, epoch["t"], log_t, events, counts)
             continue
         elif epoch["placed"] == 0:
             heed_breaks(part, 0, q)
             continue
         else:
-            if s["in_outage"] == 1 and s["emitted_t"] < s["t"]:
-                # The last word before help arrives: this is where drift is read off.
-                emit_solution(s, work, STATUS_OUTAGE, log_t, out[0], counts)
-                if work["trail"]["on"] == 1:
-                    close_inertial(s, cfg, work, log_t, OWN, out[6])
-            advance(s, cfg, work, at)
+            arrive(s, cfg, work, at, log_t, out)
             count, total = use_epoch(
                 s, g, q, cfg, pcfg, rcfg, work, solve, epoch, part, room, log_t, out
             )
@@ -152,8 +141,7 @@ def _take_epochs(
             s, q, cfg, pcfg, rcfg, work, solve, epoch, part, count, total, room, found, weight,
             log_t, out,
         )  # fmt: skip
-    if early > 0:
-        record_event(events, counts, t, log_t, EVENT_TIME_BACKWARD, float(early), NOTE_EARLY)
+    refuse_early(early, t, log_t, events, counts)
     return k
 
 

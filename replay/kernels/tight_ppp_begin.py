@@ -19,7 +19,7 @@ from replay.kernels.ppp_update import count_used, settle
 from replay.kernels.records import LEVELLED
 from replay.kernels.rotation import cross3, rotate3
 from replay.kernels.rtk_states import heed_breaks
-from replay.kernels.single_point import true_time
+from replay.kernels.single_solve import true_time
 from replay.kernels.tight_ppp_records import LEAD
 from replay.kernels.types import Array, Record
 from replay.kernels.update import state_count

@@ -4,10 +4,11 @@ from typing import Any, Final
 
 from numba import njit
 
+from replay.kernels.antenna_measures import antenna, widen
 from replay.kernels.dilution import dilutions
 from replay.kernels.earth import enu_axes
 from replay.kernels.gnss_records import SATELLITES, SLOTS
-from replay.kernels.loose import NOTE_FIX
+from replay.kernels.inertial_samples import NOTE_FIX, end_outage
 from replay.kernels.output_rows import close_inertial, emit_epoch, emit_solution
 from replay.kernels.ppp_measures import build_measures, view_rows
 from replay.kernels.ppp_output import (
@@ -31,7 +32,6 @@ from replay.kernels.ppp_states import predict
 from replay.kernels.ppp_update import count_used, mark_satellites, settle, update_epoch
 from replay.kernels.prediction import remove_sensor_errors
 from replay.kernels.records import (
-    EVENT_OUTAGE_END,
     STATUS_PREDICTED,
     STATUS_UPDATED,
 )
@@ -60,8 +60,7 @@ from replay.kernels.tight_ppp_states import (
     name_states,
     repack_states,
 )
-from replay.kernels.tight_rtk import hold_integers, show_fixed
-from replay.kernels.tight_update import antenna, widen
+from replay.kernels.tight_rtk_epoch import hold_integers, show_fixed
 from replay.kernels.transition import (
     GIVEN_INTEGERS,
     OWN,
@@ -229,11 +228,7 @@ def say_epoch(
     status = 0
     if used > 0:
         status = FLOAT if settled >= _LEAST_PHASES else STATUS_UPDATED
-        if s["in_outage"] == 1:
-            away = (t - s["fix_t"]) * 1e-9
-            record_event(events, counts, t, log_t, EVENT_OUTAGE_END, away, NOTE_FIX)
-            s["in_outage"] = 0
-        s["fix_t"] = t
+        end_outage(s, t, log_t, events, counts)
     write_states(
         part, views, count, t, log_t, q, rcfg, x, P, zeniths, slants, biases, phases, tally
     )

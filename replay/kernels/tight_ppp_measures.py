@@ -13,11 +13,11 @@ from numba import njit
 
 from replay.kernels.elementary import atan2
 from replay.kernels.least_squares import geometric_range
+from replay.kernels.median import median
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
 from replay.kernels.ppp_records import CODE, DOPPLER, IONOSPHERE_COMBINATION, PHASE
 from replay.kernels.ppp_states import SECOND
-from replay.kernels.single_point import predicted_range_rate
-from replay.kernels.slips import median
+from replay.kernels.single_solve import predicted_range_rate
 from replay.kernels.tight_ppp_records import LEAD
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import noise_factor

@@ -11,7 +11,7 @@ import numpy as np
 
 from replay.kernels.gnss_records import SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.records import MAX_STATES
-from replay.kernels.single_point import SINGLE_CONFIG_DTYPE
+from replay.kernels.single_records import SINGLE_CONFIG_DTYPE
 
 CLOCK: Final = 0
 DRIFT: Final = SYSTEMS

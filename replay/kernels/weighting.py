@@ -8,6 +8,10 @@ from numba import njit
 from replay.kernels.elementary import pow, sin
 from replay.kernels.types import Record
 
+ROBUST_NONE: Final = 0
+ROBUST_HUBER: Final = 1
+ROBUST_IGG3: Final = 2
+
 EQUAL: Final = 0
 SINE: Final = 1
 THRESHOLD: Final = 2

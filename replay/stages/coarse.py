@@ -14,7 +14,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.gnss.measurements import Selection, select_signals
-from replay.kernels import single_point
+from replay.kernels import single_point, single_records
 from replay.kernels.gnss_records import SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -85,8 +85,8 @@ class CoarsePositions:
         epochs = found.epochs
         # The iteration finds its way from the Earth's centre, too.
         epochs["placed"] = 1
-        solved = np.zeros(len(epochs) + 1, dtype=single_point.SINGLE_ROW_DTYPE)
-        residuals = np.zeros(len(found.rows), dtype=single_point.RESIDUAL_DTYPE)
+        solved = np.zeros(len(epochs) + 1, dtype=single_records.SINGLE_ROW_DTYPE)
+        residuals = np.zeros(len(found.rows), dtype=single_records.RESIDUAL_DTYPE)
         notes = np.zeros(len(found.rows) + 2 * len(epochs), dtype=NOTE_DTYPE)
         counts = np.zeros(3, dtype=np.int64)
         single_point.run_single(
@@ -94,7 +94,7 @@ class CoarsePositions:
         )
         _place(epochs, solved[: counts[0]], state.last)
         few = notes[: counts[2]]
-        few = few[few["kind"] != single_point.EVENT_EXCLUDED]
+        few = few[few["kind"] != single_records.EVENT_EXCLUDED]
         columns = {
             channels.COARSE: coarse_columns(epochs),
             channels.GNSS_EVENTS: event_columns(few, EVENT_TEXT),

@@ -20,7 +20,7 @@ from replay.gnss.measurements import Selection, select_signals
 from replay.kernels import records, tight, tight_records
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.log.columns import Columns, concatenate
 from replay.stages.base import (
     Block,

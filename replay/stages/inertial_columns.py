@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from replay.kernels import loose, records
+from replay.kernels import inertial_samples, records
 from replay.log.columns import Columns, Ragged
 from replay.schemas import filter_pb2
 
@@ -92,7 +92,7 @@ def event_columns(rows: Array) -> Columns:
     """Events from records of EVENT_DTYPE."""
     details = [
         _EARLY_TEXT.format(value=float(row["value"]))
-        if row["note"] == loose.NOTE_EARLY
+        if row["note"] == inertial_samples.NOTE_EARLY
         else _EVENT_TEXT[int(row["kind"])].format(
             value=float(row["value"]), note=_NOTES[int(row["note"])]
         )

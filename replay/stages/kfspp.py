@@ -19,7 +19,7 @@ from replay.kernels import kinematic
 from replay.kernels.gnss_records import SYSTEM_LETTERS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.schemas import solution_pb2
 from replay.stages.base import (
     Block,

@@ -17,6 +17,7 @@ import numpy as np
 from replay import channels
 from replay.configuration import Section
 from replay.kernels import network_corrections as kernel
+from replay.kernels import network_matching
 from replay.kernels.baseline_errors import ERROR_ROW_DTYPE
 from replay.kernels.earth import enu_axes
 from replay.log.columns import Columns
@@ -48,7 +49,7 @@ _LATE_NS: Final = 10 * _NS
 
 _TYPES: Final[dict[str, np.dtype[Any]]] = {
     "places": kernel.PLACE_DTYPE,
-    "epochs": kernel.ERROR_EPOCH_DTYPE,
+    "epochs": network_matching.ERROR_EPOCH_DTYPE,
     "rows": ERROR_ROW_DTYPE,
     "now": np.dtype(np.int64),
     "released": np.dtype(np.int64),
@@ -122,7 +123,7 @@ class NetworkCorrections:
                 [station_position(config, context, role) for role in self.stations]
             ).reshape(-1, 3),
             places=np.zeros(0, dtype=kernel.PLACE_DTYPE),
-            epochs=np.zeros(0, dtype=kernel.ERROR_EPOCH_DTYPE),
+            epochs=np.zeros(0, dtype=network_matching.ERROR_EPOCH_DTYPE),
             rows=np.zeros(0, dtype=ERROR_ROW_DTYPE),
             now=np.zeros(1, dtype=np.int64),
             released=np.zeros(1, dtype=np.int64),
@@ -164,7 +165,7 @@ class NetworkCorrections:
             rows = error_records(columns)
             own = state.epochs["t"][state.epochs["baseline"] == place]
             starts, counts = rising_epochs(rows, int(own[-1]) if len(own) else -1)
-            found = np.zeros(len(starts), dtype=kernel.ERROR_EPOCH_DTYPE)
+            found = np.zeros(len(starts), dtype=network_matching.ERROR_EPOCH_DTYPE)
             found["baseline"] = place
             found["t"] = rows["t"][starts]
             found["log_t"] = rows["log_t"][starts]
@@ -185,7 +186,7 @@ class NetworkCorrections:
         tolerance, _, max_age, late = state.times
         chosen = np.full((count, baselines), -1, dtype=np.int64)
         release = np.zeros(count, dtype=np.int64)
-        ready = kernel.match_errors(
+        ready = network_matching.match_errors(
             np.ascontiguousarray(state.places["t"]),
             np.ascontiguousarray(state.places["log_t"]),
             state.epochs, baselines, int(state.now[0]), last, tolerance, wait, max_age, late,

@@ -21,7 +21,7 @@ from replay.kernels.gnss_records import BEIDOU, FIRST, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.rtk_records import AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.log.columns import Columns
 from replay.stages.base import (
     Block,

@@ -17,7 +17,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import Selection, select_signals
-from replay.kernels import rtk, rtk_records, single_point
+from replay.kernels import rtk, rtk_records, single_records
 from replay.kernels.gnss_records import SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -216,9 +216,9 @@ class Rtk:
         """The compiled loop over the first `ready` epochs: outputs and their counts."""
         epochs = state.epochs[:ready]
         end = int(epochs["first"][-1] + epochs["count"][-1])
-        solutions = np.zeros(ready, dtype=single_point.SINGLE_ROW_DTYPE)
+        solutions = np.zeros(ready, dtype=single_records.SINGLE_ROW_DTYPE)
         baselines = np.zeros(ready, dtype=rtk_records.BASELINE_ROW_DTYPE)
-        innovations = np.zeros(2 * SLOTS * end, dtype=single_point.RESIDUAL_DTYPE)
+        innovations = np.zeros(2 * SLOTS * end, dtype=single_records.RESIDUAL_DTYPE)
         ambiguities = np.zeros(SLOTS * end, dtype=rtk_records.AMBIGUITY_ROW_DTYPE)
         resolutions = np.zeros(ready, dtype=rtk_records.RESOLUTION_ROW_DTYPE)
         # Per epoch the base's loss, too few differences, a fix or its loss; and breaks.

@@ -16,12 +16,12 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import Selection, select_signals
-from replay.kernels import records, rtk_records, tight_rtk
+from replay.kernels import records, rtk_records, tight_rtk, tight_rtk_states
 from replay.kernels.epoch_matching import LATE_NS
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.log.columns import Columns
 from replay.stages.base import (
     BASE,
@@ -62,7 +62,7 @@ Array = np.ndarray[Any, Any]
 _NS: Final = 1_000_000_000
 _EVENT_ROOM: Final = 4096
 _NEVER: Final = -(2**62)
-_STATES: Final = tight_rtk.RTK_TIGHT_STATES
+_STATES: Final = tight_rtk_states.RTK_TIGHT_STATES
 
 
 @dataclasses.dataclass(slots=True)

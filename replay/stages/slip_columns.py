@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from replay.gnss.measurements import SATELLITE_NAMES, signal_names
-from replay.kernels.slips import SLIP_CONFIG_DTYPE
+from replay.kernels.slip_records import SLIP_CONFIG_DTYPE
 from replay.log.columns import Columns
 from replay.stages.tdcp_config import Slips
 

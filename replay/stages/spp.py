@@ -16,7 +16,7 @@ from replay import channels
 from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals
-from replay.kernels import single_point
+from replay.kernels import single_point, single_records, weighting
 from replay.kernels.gnss_records import SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -37,9 +37,9 @@ from replay.stages.waiting import read_epochs
 Array = np.ndarray[Any, Any]
 
 _ROBUST: Final = {
-    "none": single_point.ROBUST_NONE,
-    "huber": single_point.ROBUST_HUBER,
-    "igg3": single_point.ROBUST_IGG3,
+    "none": weighting.ROBUST_NONE,
+    "huber": weighting.ROBUST_HUBER,
+    "igg3": weighting.ROBUST_IGG3,
 }
 
 
@@ -94,8 +94,8 @@ class SinglePoint:
         if not state.placed:
             # The iteration finds its way from the Earth's centre, too.
             found.epochs["placed"] = 1
-        solutions = np.zeros(len(found.epochs) + 1, dtype=single_point.SINGLE_ROW_DTYPE)
-        residuals = np.zeros(len(found.rows), dtype=single_point.RESIDUAL_DTYPE)
+        solutions = np.zeros(len(found.epochs) + 1, dtype=single_records.SINGLE_ROW_DTYPE)
+        residuals = np.zeros(len(found.rows), dtype=single_records.RESIDUAL_DTYPE)
         notes = np.zeros(len(found.rows) + 2 * len(found.epochs), dtype=NOTE_DTYPE)
         counts = np.zeros(3, dtype=np.int64)
         single_point.run_single(
@@ -153,7 +153,7 @@ def single_config(gnss: Gnss, spp: Spp) -> Array:
     ConfigurationError
         Where a satellite is unknown or a list has the wrong length.
     """
-    record = np.zeros(1, dtype=single_point.SINGLE_CONFIG_DTYPE)
+    record = np.zeros(1, dtype=single_records.SINGLE_CONFIG_DTYPE)
     record["excluded"] = excluded_satellites(gnss)
     if len(spp.system_scale) not in (1, SYSTEMS):
         raise ConfigurationError(f"spp.system_scale has {SYSTEMS} numbers or one")

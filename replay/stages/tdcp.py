@@ -23,12 +23,12 @@ from replay.configuration import Section
 from replay.errors import ConfigurationError
 from replay.gnss.measurements import SATELLITE_NAMES, Selection, select_signals
 from replay.kernels import tdcp as kernel
-from replay.kernels import tdcp_records, tdcp_solve
+from replay.kernels import tdcp_adjust, tdcp_records, weighting
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
-from replay.kernels.slips import SLIP_ROW_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.slip_records import SLIP_ROW_DTYPE
 from replay.log.columns import Columns
 from replay.stages.base import Block, Context, Outputs, Port, StageSpec
 from replay.stages.gnss_columns import (
@@ -47,9 +47,9 @@ from replay.stages.waiting import read_epochs
 Array = np.ndarray[Any, Any]
 
 _ROBUST: Final = {
-    "none": tdcp_solve.ROBUST_NONE,
-    "huber": tdcp_solve.ROBUST_HUBER,
-    "igg3": tdcp_solve.ROBUST_IGG3,
+    "none": weighting.ROBUST_NONE,
+    "huber": weighting.ROBUST_HUBER,
+    "igg3": weighting.ROBUST_IGG3,
 }
 _SLIPS_PER_PHASE: Final = 5
 _AXES: Final = 3
@@ -151,7 +151,7 @@ def tdcp_config(gnss: Gnss, tdcp: Tdcp) -> Array:
     ConfigurationError
         Where a satellite is unknown or a list has the wrong length.
     """
-    record = np.zeros(1, dtype=tdcp_solve.TDCP_CONFIG_DTYPE)
+    record = np.zeros(1, dtype=tdcp_adjust.TDCP_CONFIG_DTYPE)
     names = [name.decode() for name in SATELLITE_NAMES]
     for name in gnss.exclude:
         if name not in names:

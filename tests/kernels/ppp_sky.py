@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from replay.kernels import ppp, ppp_output, ppp_records, rtk_records, single_point
+from replay.kernels import ppp, ppp_output, ppp_records, rtk_records, single_records
 from replay.kernels.gnss_records import EPOCH_DTYPE, MEASURED_DTYPE, SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
@@ -197,8 +197,8 @@ def run(config, epochs, rows, state=None, recorder=None):
 
     def call(nodes):
         outs = [
-            np.zeros(len(epochs), dtype=single_point.SINGLE_ROW_DTYPE),
-            np.zeros(8 * n, dtype=single_point.RESIDUAL_DTYPE),
+            np.zeros(len(epochs), dtype=single_records.SINGLE_ROW_DTYPE),
+            np.zeros(8 * n, dtype=single_records.RESIDUAL_DTYPE),
             np.zeros(3 * n, dtype=rtk_records.AMBIGUITY_ROW_DTYPE),
             np.zeros(len(epochs), dtype=rtk_records.RESOLUTION_ROW_DTYPE),
             np.zeros(300 * len(epochs), dtype=NOTE_DTYPE),

@@ -8,7 +8,7 @@ from replay.kernels import least_squares
 from replay.kernels.dilution import dilutions
 from replay.kernels.earth import enu_axes
 from replay.kernels.gnss_records import MEASURED_DTYPE
-from replay.kernels.single_point import SINGLE_ROW_DTYPE
+from replay.kernels.single_records import SINGLE_ROW_DTYPE
 
 HERE = np.array(pymap3d.geodetic2ecef(48.0, 11.0, 500.0))
 CLOCKS = np.array([1e5, -40.0, 12.0, 300.0, 7.0])

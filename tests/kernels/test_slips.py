@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from replay.kernels import slips
+from replay.kernels import slip_records, slips
 from replay.kernels.gnss_records import SATELLITES, SLOTS
 from tests.kernels.synthetic_phases import F1, F2, Scene, slip, slip_settings
 
@@ -23,8 +23,8 @@ NOISE = {"phase_noise": 0.002, "code_noise": 0.2}
 def search(epochs, rows, **keys):
     """Rows of slips, states of all phases (epochs, n, SLOTS) and clock jumps."""
     config = slip_settings(**keys)
-    state = slips.new_slip_state()
-    found = np.zeros(20 * len(rows), dtype=slips.SLIP_ROW_DTYPE)
+    state = slip_records.new_slip_state()
+    found = np.zeros(20 * len(rows), dtype=slip_records.SLIP_ROW_DTYPE)
     count = np.zeros(1, dtype=np.int64)
     states, jumps = [], []
     for epoch in epochs:
@@ -44,8 +44,8 @@ def test_good_phases_are_continuous():
     epochs, rows = Scene(**NOISE).epochs(60)
     found, states, jumps = search(epochs, rows)
     assert len(found) == 0
-    assert (states[0] == slips.NEW).all()
-    assert (states[1:, :, :2] == slips.CONTINUOUS).all()
+    assert (states[0] == slip_records.NEW).all()
+    assert (states[1:, :, :2] == slip_records.CONTINUOUS).all()
     assert not jumps.any()
 
 
@@ -61,7 +61,7 @@ def test_two_frequencies_tell_which_one_jumped_and_how_far(first, second):
     sizes = {int(row["signal"]) % 256 - ord("1"): row["size"] for row in found}
     assert sizes == {slot: n for slot, n in enumerate((first, second)) if n}
     expected = np.zeros_like(states[1:])
-    expected[:, :, 2] = slips.NEW
+    expected[:, :, 2] = slip_records.NEW
     expected[39, 4, :2] = [first != 0, second != 0]
     np.testing.assert_array_equal(states[1:], expected)
 
@@ -74,7 +74,7 @@ def test_the_wide_lane_finds_what_the_geometry_free_phase_hardly_shows():
     slip(rows, 2, 1, 30, 7, scene.satellites)
     assert not len(search(epochs, rows, **{**OFF, "geometry_free": 0.025})[0])
     found, _, _ = search(epochs, rows, **{**OFF, "wide_lane": 4.0})
-    assert found["detector"].tolist() == [slips.WIDE_LANE] * 2
+    assert found["detector"].tolist() == [slip_records.WIDE_LANE] * 2
     assert found["size"].tolist() == [9.0, 7.0]
 
 
@@ -84,7 +84,7 @@ def test_one_frequency_against_its_doppler(cycles):
     epochs, rows = scene.epochs(10)
     slip(rows, 1, 0, 6, cycles, scene.satellites)
     (row,), _, _ = search(epochs, rows, **{**OFF, "doppler": 5.0})
-    assert row["detector"] == slips.DOPPLER
+    assert row["detector"] == slip_records.DOPPLER
     assert (row["satellite"], row["t"]) == (1, epochs[6]["t"])
     assert row["size"] == pytest.approx(cycles, abs=0.5)
     assert abs(row["statistic"]) > row["threshold"]
@@ -101,10 +101,10 @@ def test_what_the_receiver_says():
     assert len(found) == 0
     told = {"loss_of_lock": True, "lock_time": True, "half_cycles": True}
     found, states, _ = search(epochs, rows, **{**OFF, **told})
-    assert (found["detector"] == slips.LOSS_OF_LOCK).all()
+    assert (found["detector"] == slip_records.LOSS_OF_LOCK).all()
     places = [(int((row["t"] - epochs["t"][0]) // 10**9), row["satellite"]) for row in found]
     assert places == [(3, 0), (4, 1), (5, 2)]
-    assert [states[e, k, 0] for e, k in places] == [slips.SUSPECT] * 3
+    assert [states[e, k, 0] for e, k in places] == [slip_records.SUSPECT] * 3
 
 
 def test_a_phase_that_was_away_is_a_new_one():
@@ -112,9 +112,9 @@ def test_a_phase_that_was_away_is_a_new_one():
     epochs, rows = scene.epochs(8)
     rows["phase"][3 * scene.satellites + 5, 0] = np.nan
     (row,), states, _ = search(epochs, rows)
-    assert (row["detector"], row["satellite"], row["t"]) == (slips.GAP, 5, epochs[4]["t"])
-    assert states[3, 5, 0] == states[4, 5, 0] == slips.NEW
-    assert states[5, 5, 0] == slips.CONTINUOUS
+    assert (row["detector"], row["satellite"], row["t"]) == (slip_records.GAP, 5, epochs[4]["t"])
+    assert states[3, 5, 0] == states[4, 5, 0] == slip_records.NEW
+    assert states[5, 5, 0] == slip_records.CONTINUOUS
 
 
 @pytest.mark.parametrize("of_phase", [True, False])
@@ -132,7 +132,7 @@ def test_a_jump_of_the_clock_is_not_a_slip_of_all(of_phase, jump_ms):
     epochs["t"][25:] += jump_ms * 10**6
     found, states, jumps = search(epochs, rows)
     assert len(found) == 0
-    assert (states[1:, :, :2] == slips.CONTINUOUS).all()
+    assert (states[1:, :, :2] == slip_records.CONTINUOUS).all()
     assert np.flatnonzero(jumps).tolist() == [25]
     assert jumps[25] == pytest.approx(jump, abs=1.0)
 

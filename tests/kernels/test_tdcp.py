@@ -10,8 +10,8 @@ from replay.kernels import tdcp, tdcp_records
 from replay.kernels.gnss_records import SLOTS
 from replay.kernels.least_squares import SOLVE_DTYPE
 from replay.kernels.sights import NOTE_DTYPE
-from replay.kernels.single_point import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
-from replay.kernels.slips import SLIP_ROW_DTYPE, TIME_DIFFERENCE
+from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
+from replay.kernels.slip_records import SLIP_ROW_DTYPE, TIME_DIFFERENCE
 from tests.kernels.synthetic_phases import (
     EAST,
     F1,

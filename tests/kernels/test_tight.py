@@ -5,10 +5,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from replay.configuration import build
-from replay.kernels import records, tight, tight_records, tight_update, update
+from replay.kernels import (
+    antenna_measures,
+    records,
+    tight,
+    tight_phases,
+    tight_records,
+    tight_update,
+    update,
+)
 from replay.kernels.gnss_records import EPOCH_DTYPE, FIRST, MEASURED_DTYPE, SATELLITES, SYSTEMS
 from replay.kernels.prediction import remove_sensor_errors
-from replay.kernels.single_point import RESIDUAL_DTYPE
+from replay.kernels.single_records import RESIDUAL_DTYPE
 from replay.kernels.tight_records import CHANGE, CLOCK, CLONE, DRIFT, TIGHT_STATES
 from replay.kernels.transition import trail_dtype
 from replay.stages.gnss_ins_tc import tight_record
@@ -220,7 +228,7 @@ def run_codes(s, g, tcfg, rows):
     x, v, u = np.zeros(3), np.zeros(3), np.zeros(3)
     found = np.zeros(64, dtype=RESIDUAL_DTYPE)
     counts, weight = np.zeros(2, dtype=np.int64), np.zeros(SATELLITES)
-    tight_update.antenna(s, work, tcfg["lever"], x, v)
+    antenna_measures.antenna(s, work, tcfg["lever"], x, v)
     tight_update.use_codes(s, g, cfg, tcfg, work, EPOCH[0], rows, weight, x, u, found, counts)
     return found[: counts[0]]
 
@@ -229,7 +237,7 @@ def run_dopplers(s, g, tcfg, rows):
     cfg, work = config(), workspace(s)
     x, v, u, scratch = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(SATELLITES)
     found, counts = np.zeros(64, dtype=RESIDUAL_DTYPE), np.zeros(2, dtype=np.int64)
-    tight_update.antenna(s, work, tcfg["lever"], x, v)
+    antenna_measures.antenna(s, work, tcfg["lever"], x, v)
     tight_update.use_dopplers(
         s, g, cfg, tcfg, work, EPOCH[0], rows, x, v, u, scratch, found, counts
     )
@@ -241,8 +249,8 @@ def run_changes(s, g, tcfg, rows):
     x, v, u = np.zeros(3), np.zeros(3), np.zeros(3)
     scratch = np.zeros(3 * SATELLITES)
     found, counts = np.zeros(64, dtype=RESIDUAL_DTYPE), np.zeros(2, dtype=np.int64)
-    tight_update.antenna(s, work, tcfg["lever"], x, v)
-    tight_update.use_phase_changes(
+    antenna_measures.antenna(s, work, tcfg["lever"], x, v)
+    tight_phases.use_phase_changes(
         s, g, cfg, tcfg, work, EPOCH[0], rows, x, u, scratch, found, counts
     )
     return found[: counts[0]]
@@ -257,7 +265,7 @@ def corrections(rows, slot=0):
 def test_antenna():
     s, _ = filter_state()
     x, v = np.zeros(3), np.zeros(3)
-    tight_update.antenna(s, workspace(s), settings()["lever"], x, v)
+    antenna_measures.antenna(s, workspace(s), settings()["lever"], x, v)
     wanted = antenna_of(s)
     np.testing.assert_allclose(x, wanted[0], rtol=0, atol=1e-8)
     np.testing.assert_allclose(v, wanted[1], rtol=0, atol=1e-9)
@@ -405,7 +413,7 @@ def test_the_cloned_place_has_the_antennas_covariance():
     before = s["P"][:COUNT, :COUNT].copy()
     rows = satellites(s)
     x = antenna_of(s)[0]
-    tight_update.remember(s, g, config(), settings(), workspace(s), EPOCH[0], rows, x)
+    tight_phases.remember(s, g, config(), settings(), workspace(s), EPOCH[0], rows, x)
     G = np.eye(COUNT)
     place = slice(INERTIAL + CLONE, INERTIAL + CLONE + 3)
     G[place] = sensitivities(lambda state: antenna_of(state)[0])

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from replay.kernels import records, rtk, tight_rtk, update
+from replay.kernels import records, rtk_update, tight_rtk_epoch, tight_rtk_states, update
+from replay.kernels.integers import ATTEMPT_DTYPE, CANDIDATE_DTYPE
 from replay.kernels.rtk_records import (
     MEASURE_DTYPE,
     MEASURE_STATES,
     ROOM,
     RTK_CONFIG_DTYPE,
 )
-from replay.kernels.rtk_resolve import ATTEMPT_DTYPE, CANDIDATE_DTYPE
-from replay.kernels.tight_rtk import LEAD, RTK_TIGHT_STATES
+from replay.kernels.tight_rtk_states import LEAD, RTK_TIGHT_STATES
 from tests.kernels.test_measurements import config
 from tests.kernels.test_strapdown import start
 
@@ -82,7 +82,7 @@ def to_antenna():
 def test_covariance_of_the_antenna_and_the_ambiguities():
     s = filter_state()
     out = np.zeros((LEAD + EXTRA, LEAD + EXTRA))
-    tight_rtk.antenna_covariance(s["P"], COUNT, INERTIAL, arm_of(s), out)
+    tight_rtk_states.antenna_covariance(s["P"], COUNT, INERTIAL, arm_of(s), out)
     P, T = np.array(s["P"])[:COUNT, :COUNT], to_antenna()
     # Positions of 6e6 m difference to 1e-9 m over 2e-3.
     np.testing.assert_allclose(out, T @ P @ T.T, atol=5e-6)
@@ -118,7 +118,7 @@ def test_measurements_of_the_antenna_become_those_of_the_joint_states():
     s = filter_state()
     measures = some_measures(np.random.default_rng(5), EXTRA)
     joint = np.zeros_like(measures)
-    tight_rtk.to_joint(measures, len(measures), INERTIAL, arm_of(s), joint)
+    tight_rtk_states.to_joint(measures, len(measures), INERTIAL, arm_of(s), joint)
     got = dense_rows(joint, COUNT)
     np.testing.assert_allclose(got, dense_rows(measures, LEAD + EXTRA) @ to_antenna(), atol=5e-6)
     for name in ("kind", "pair", "slot", "group", "satellite", "z", "r", "use"):
@@ -166,7 +166,7 @@ def test_prior_of_states_dropped_born_and_reordered(source):
     places = np.full(ROOM, -1, dtype=np.int64)
     places[:LEAD] = [0, 1, 2]
     places[LEAD:n] = source
-    tight_rtk.joint_prior(s["P"], INERTIAL, A, n, places, J)
+    tight_rtk_states.joint_prior(s["P"], INERTIAL, A, n, places, J)
     np.testing.assert_array_equal(J[:size, :size], want)
     assert not J[size].any()
     assert not J[:, size].any()
@@ -193,12 +193,12 @@ def test_update_of_an_epoch_is_that_of_dense_double_differences():
     measures = some_measures(np.random.default_rng(6), EXTRA)
     half = len(measures) // 2
     joint = np.zeros_like(measures)
-    tight_rtk.to_joint(measures, len(measures), INERTIAL, arm_of(s), joint)
+    tight_rtk_states.to_joint(measures, len(measures), INERTIAL, arm_of(s), joint)
     J = np.zeros((COUNT + 1, COUNT + 1))
     J[:COUNT, :COUNT] = P
     new, dx = np.empty_like(J), np.zeros(COUNT + 1)
     starts = np.array([0, half, 2 * half], dtype=np.int64)
-    rtk.update_epoch(
+    rtk_update.update_epoch(
         joint, starts, 2, J, COUNT + 1, settings(), np.full(3, np.nan), np.zeros((3, 3)),
         np.zeros(ROOM), new, dx,
     )  # fmt: skip
@@ -234,7 +234,7 @@ def test_held_integers_are_measurements_of_the_joint_states():
     R = np.diag((0.03 * candidates["wavelength"][:held]) ** 2)
     dx, want = dense_update(P, H, z, R)
     rcfg = settings(hold_sigma=0.03, hold_mask=0.3)
-    tight_rtk.hold_integers(s, config(), rcfg, workspace(), candidates, 3, INERTIAL)
+    tight_rtk_epoch.hold_integers(s, config(), rcfg, workspace(), candidates, 3, INERTIAL)
     np.testing.assert_allclose(np.array(s["P"])[:COUNT, :COUNT], want, atol=1e-12)
     np.testing.assert_allclose(s["aux"][:EXTRA], aux[:EXTRA] + dx[INERTIAL:], atol=1e-12)
     np.testing.assert_allclose(s["bg"], bias + dx[9:12], atol=1e-12)
@@ -261,7 +261,7 @@ def test_the_position_shown_is_that_of_a_filter_told_where_the_antenna_is():
     axes = Rotation.random(random_state=3).as_matrix()
     work["axes"] = axes
     row = np.zeros(1, dtype=records.SOLUTION_DTYPE)[0]
-    tight_rtk.show_fixed(s, work, tried, x, A, arm_of(s), row)
+    tight_rtk_epoch.show_fixed(s, work, tried, x, A, arm_of(s), row)
     np.testing.assert_allclose(row["r"], s["nav"]["r"] + dx[:3], atol=1e-5)
     local = axes @ after[:3, :3] @ axes.T
     np.testing.assert_allclose(row["cov"], local[np.triu_indices(3)], atol=2e-5)
