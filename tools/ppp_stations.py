@@ -7,7 +7,10 @@ A station stands still. Of each set of systems, mode and session the table tells
 and up scatter about their own mean and are off from the reference, from the first hour on; the
 minutes until all three keep within 10 cm, to the end of the session and for ten minutes; CPU
 seconds and epochs per CPU second. A session begins anew; of static sessions the last positions
-are compared. Both programs get the same files, systems and mask, and stop where the orbits end.
+are compared. Of lengths with more than four sessions, as `--hours 1`, a further table sums up
+the minutes until all three had kept within 10 cm for ten minutes: a session that never did
+counts with its whole length in the mean. Both programs get the same files, systems and mask,
+and stop where the orbits end.
 
 Without `--reference` it is RTKLIB's static position of the whole span with the last of the
 systems; where RTKLIB gives none, as for files without navigation messages, which it needs
@@ -36,10 +39,11 @@ from replay.configuration import merge, parse_assignments
 from replay.engine.job import make_job
 from replay.engine.run import replay_log
 from replay.errors import UsageError
-from replay.evaluate.convergence import EACH, convergence_of
+from replay.evaluate.convergence import EACH, Convergence, convergence_of
 from replay.evaluate.geometry import Floats, enu_axes, turn, turn_back
 from replay.evaluate.station import repeatability_of
 from replay.evaluate.station_table import minutes
+from replay.evaluate.statistics import LOCAL_AXES
 from replay.importers import import_log, load_spec
 from replay.log.reader import LogReader
 from replay.log.writer import LogWriter
@@ -54,6 +58,7 @@ SYSTEMS = {"esbc": ["G", "GE", "GER"], "ccj2": ["G", "GE", "GEJ"]}
 HOURS = {"esbc": [24, 6], "ccj2": [1]}
 HOUR_NS = 3600 * NS_PER_S
 MM = 1e3
+MANY = 4  # sessions that are told one by one alone
 QUALITIES = {
     solution_pb2.SOLUTION_STATUS_FIXED: FIXED,
     solution_pb2.SOLUTION_STATUS_FLOAT: FLOAT,
@@ -139,6 +144,7 @@ class Report:
         for number, name in enumerate(heads):
             self.table.add_column(name, justify="left" if number < 4 else "right")
         self.ends: dict[tuple[str, str], list[tuple[float, ...]]] = {}
+        self.starts: dict[tuple[str, str], list[tuple[Convergence | None, float]]] = {}
 
     def add(
         self, program: str, setting: Setting, span: Span, first_ns: int, track: Track, place: Floats
@@ -147,13 +153,17 @@ class Report:
         hours = [(t - first_ns) / HOUR_NS for t in span]
         session = f"{hours[0]:.0f} to {hours[1]:.1f} h"
         mode = setting.name.split()[1]
+        length_s = (span[1] - span[0]) / NS_PER_S
+        starts = self.starts.setdefault((f"{program} {setting.name}", _hours(span)), [])
         if len(track.times_ns) == 0:
             self.table.add_row(program, setting.systems, mode, session, "0")
+            starts.append((None, length_s))
             return
         enu = off(track, place)
         start = min(HOUR_NS, (span[1] - span[0]) // 2)
         late = track.times_ns - span[0] >= start
         found = convergence_of(track.times_ns, enu, start_ns=span[0])
+        starts.append((found, length_s))
         numbers = np.concatenate(
             [f(enu[late]) for f in (_std, _mean, _rms)] if late.any() else [np.full(9, np.nan)]
         )
@@ -172,7 +182,7 @@ class Report:
             f"{len(track.times_ns) / track.cpu_s:.0f}",
         )
         if setting.static:
-            key = (f"{program} {setting.systems}", f"{(span[1] - span[0]) / HOUR_NS:.0f} h")
+            key = (f"{program} {setting.systems}", _hours(span))
             self.ends.setdefault(key, []).append(tuple(enu[-1]))
         for word, quality in (("float", FLOAT), ("fixed", FIXED)):
             rows = late & (track.quality == quality)
@@ -181,6 +191,22 @@ class Report:
                 cells = [f"{MM * value:.1f}" for value in std]
                 flat = f"horizontal {MM * float(np.hypot(std[0], std[1])):.1f}"
                 self.table.add_row(f"  {word}", flat, "", "", str(rows.sum()), "", "", *cells)
+
+    def convergence(self) -> Table | None:
+        """Minutes to convergence over many sessions; None where there are few."""
+        table = Table(title="Minutes to 10 cm, held for ten minutes", title_justify="left")
+        for name in ("program", "session", "count", "never", "mean", "median", "most"):
+            table.add_column(name)
+        for axis in LOCAL_AXES:
+            table.add_column(f"mean {axis}")
+        for (program, session), starts in self.starts.items():
+            if len(starts) > MANY:
+                each, *axes = (minutes_held(starts, name) for name in (EACH, *LOCAL_AXES))
+                never = [found is None or found.held_s[EACH] is None for found, _ in starts]
+                cells = [np.mean(each), np.median(each), np.max(each), *map(np.mean, axes)]
+                words = [f"{value:.1f}" for value in cells]
+                table.add_row(program, session, str(len(starts)), str(sum(never)), *words)
+        return table if table.row_count else None
 
     def repeatability(self) -> Table:
         """Last positions of static sessions about their mean."""
@@ -196,6 +222,18 @@ class Report:
                 words = [f"{MM * value:.1f}" for value in cells]
                 table.add_row(program, session, str(found.sessions), *words)
         return table
+
+
+def minutes_held(starts: Sequence[tuple[Convergence | None, float]], axis: str) -> list[float]:
+    """Minutes until the error of an axis was held, the length (s) of a session where never."""
+    held = [None if found is None else found.held_s[axis] for found, _ in starts]
+    return [
+        (length if s is None else s) / 60.0 for s, (_, length) in zip(held, starts, strict=True)
+    ]
+
+
+def _hours(span: Span) -> str:
+    return f"{(span[1] - span[0]) / HOUR_NS:.0f} h"
 
 
 def _std(enu: Floats) -> Floats:
@@ -281,6 +319,9 @@ def measure(arguments: argparse.Namespace, station: str, scratch: Path, console:
                 report.add("replay", setting, span, first, track, place)
     console.print(report.table)
     console.print(report.repeatability())
+    convergence = report.convergence()
+    if convergence is not None:
+        console.print(convergence)
     reading = theirs(files, Setting(), target, (first, first + NS_PER_S))
     if reading is None:
         console.print("RTKLIB gives no position of these files.")

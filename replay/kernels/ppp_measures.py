@@ -26,7 +26,7 @@ from replay.kernels.ppp_records import (
     VELOCITY,
     VIEWS,
 )
-from replay.kernels.ppp_states import SECOND, ionosphere_factor
+from replay.kernels.ppp_states import SECOND, ionosphere_factor, range_variance
 from replay.kernels.single_solve import predicted_range_rate
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import noise_factor
@@ -101,11 +101,9 @@ def _told(row: Record, slot: int) -> bool:
 
 @njit(cache=True)
 def _variance(row: Record, slot: int, sigma: float, scale: float, cfg: Record) -> float:
-    """Variance (m^2) of a measurement: its own, and that of orbit and clock where it is large."""
+    """Variance (m^2) of a measurement itself."""
     sigma *= scale * cfg["satellite_scale"][row["satellite"]]
-    own = sigma * sigma * noise_factor(cfg["weighting"], row["elevation"], row["cn0"][slot])
-    more = cfg["range_scale"] * (row["range_std"] - cfg["range_usual"])
-    return own + more * more if more > 0.0 else own
+    return sigma * sigma * noise_factor(cfg["weighting"], row["elevation"], row["cn0"][slot])
 
 
 @njit(cache=True)
@@ -225,6 +223,7 @@ def _single(
         return 0
     if kind == CODE:
         r = _variance(row, slot, cfg["code_sigma"][slot], cfg["code_scale"][system], cfg)
+        r += range_variance(row, cfg)
     else:
         r = _variance(row, slot, cfg["phase_sigma"][slot], cfg["phase_scale"][system], cfg)
     _open(m, kind, v, slot, sat, value, r)
@@ -263,6 +262,8 @@ def _combined(
     g0, g1 = ionosphere_factor(row["frequency"][0]), ionosphere_factor(row["frequency"][SECOND])
     a, b = g1 / (g1 - g0), -g0 / (g1 - g0)
     r = a * a * _variance(row, 0, s0, scale, cfg) + b * b * _variance(row, SECOND, s1, scale, cfg)
+    if kind == CODE:
+        r += range_variance(row, cfg)
     _open(m, kind, v, 0, sat, a * p0 + b * p1, r)
     _shared(m, view, row, slopes, s, x)
     if kind == PHASE:

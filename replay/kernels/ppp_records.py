@@ -53,6 +53,7 @@ PPP_CONFIG_DTYPE: Final = np.dtype(
         ("satellite_scale", "<f8", SATELLITES),  # on both
         ("range_scale", "<f8"),  # on what the products' deviation is more than usual
         ("range_usual", "<f8"),  # m, which the other deviations already stand for
+        ("range_walk", "<f8"),  # share of that by which it walks in 1 s, 1/sqrt(s)
         ("code_gate", "<f8"),  # deviations of a residual
         ("phase_gate", "<f8"),
         ("rounds", "<i8"),  # measurements left out of an epoch, at most

@@ -41,6 +41,17 @@ def ionosphere_factor(frequency: float) -> float:
 
 
 @njit(cache=True)
+def range_variance(row: Record, cfg: Record) -> float:
+    """What orbit and clock add to a code (m^2), where they deviate more than usual.
+
+    They are wrong by nearly the same from one epoch to the next, and by the same on all
+    frequencies: codes have it as noise, phases in their ambiguities, which walk with it.
+    """
+    more = cfg["range_scale"] * (row["range_std"] - cfg["range_usual"])
+    return float(more * more) if more > 0.0 else 0.0
+
+
+@njit(cache=True)
 def _level(row: Record, slot: int) -> float:
     """Phase less code of a slot, or less that of another one where it has none (m)."""
     code = row["code"][slot]
@@ -322,6 +333,9 @@ def _ambiguities(
             source[n] = old
             prior[n] = cfg["ambiguity_sigma"] * cfg["ambiguity_sigma"]
             grow[n] = cfg["ambiguity_noise"] * cfg["ambiguity_noise"] * dt
+            if v >= 0:
+                walk = cfg["range_walk"] * cfg["range_walk"]
+                grow[n] += walk * range_variance(rows[views[v]["rover"]], cfg) * dt
             s["amb"][sat, slot] = n
             if here:
                 s["used_t"][sat, slot] = t

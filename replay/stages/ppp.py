@@ -78,6 +78,7 @@ class PppState:
     """Everything that crosses from one block to the next."""
 
     selection: Selection
+    codes: Selection | None
     config: Array
     kernel: Array
     x: Array
@@ -96,12 +97,13 @@ class Ppp:
 
     _PLAIN: Final = StageSpec(
         name="ppp",
-        version=1,
+        version=2,
         inputs=(
             Port(channels.GNSS_OBS),
             Port(channels.SATELLITES),
             Port(channels.CORRECTIONS),
             Port(channels.COARSE),
+            Port(channels.SIGNAL_BIAS, optional=True),
         ),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
@@ -129,6 +131,7 @@ class Ppp:
             raise TypeError("ppp takes a PppConfig")
         return PppState(
             selection=select_signals(config.gnss.signals, config.gnss.systems),
+            codes=clock_codes(config, context),
             config=ppp_config(config, context),
             kernel=ppp_records.new_ppp_state(),
             x=np.zeros(ppp_records.ROOM),
@@ -138,7 +141,7 @@ class Ppp:
 
     def step(self, state: PppState, block: Block) -> tuple[PppState, Outputs]:
         """Take a block of epochs."""
-        found = read_epochs(block, state.selection)
+        found = read_epochs(block, state.selection, codes=state.codes)
         if found is None:
             return state, {}
         recorder = state.recorder
@@ -229,6 +232,16 @@ class Ppp:
         return dataclasses.replace(state, kernel=arrays["kernel"], x=x, P=P, recorder=recorder)
 
 
+def clock_codes(config: PppConfig, context: Context) -> Selection | None:
+    """Signals whose codes replace others, None where biases or broadcast clocks need none."""
+    products = config.products
+    biases = context.heads.get(Port(channels.SIGNAL_BIAS).name)
+    biased = products.biases and biases is not None and len(biases) > 0
+    if products.source != "precise" or biased or not products.clock_codes:
+        return None
+    return select_signals(products.clock_codes, config.gnss.systems)
+
+
 def ppp_config(config: PppConfig, context: Context) -> Array:
     """Settings as the record that the compiled loop reads.
 
@@ -273,6 +286,7 @@ def ppp_config(config: PppConfig, context: Context) -> Array:
     record["slots"] = measurements.frequencies
     record["weighting"] = WEIGHTINGS[measurements.weighting]
     record["range_scale"] = measurements.range_std_scale
+    record["range_walk"] = measurements.range_walk
     record["range_usual"] = config.products.range_std
     record["satellite_scale"] = 1.0
     for prn in _HIGH:

@@ -35,12 +35,12 @@ class Measurements(Section, frozen=True):
         0.6,
     )
     phase_sigma: tuple[Annotated[float, quantity("m", "in the zenith, by signal slot")], ...] = (
-        0.002,
+        0.003,
     )
     doppler_sigma: Annotated[float, quantity("m/s", "in the zenith")] = 0.05
     code_scale: tuple[
         Annotated[float, quantity("1", "on the code's; GPS, GLO, GAL, BDS, QZSS")], ...
-    ] = (1.5, 3.0, 1.0, 2.0, 1.5)
+    ] = (1.0, 3.0, 1.0, 2.0, 1.5)
     phase_scale: tuple[
         Annotated[float, quantity("1", "on the phase's; GPS, GLO, GAL, BDS, QZSS")], ...
     ] = (1.0, 1.0, 1.0, 1.5, 1.0)
@@ -50,6 +50,9 @@ class Measurements(Section, frozen=True):
     range_std_scale: Annotated[
         float, quantity("1", "on what orbit and clock deviate beyond products.range_std")
     ] = 1.0
+    range_walk: Annotated[
+        float, quantity("1", "share of that deviation by which ambiguities walk in 1 s with it")
+    ] = 2e-3
     weighting: Weighting = "sum"
     code_gate: Annotated[float, quantity("1", "deviations of a residual that are believed")] = 4.0
     phase_gate: Annotated[float, quantity("1", "deviations of a residual that are believed")] = 4.0
@@ -67,7 +70,7 @@ class Motion(Section, frozen=True):
     ] = 0.0
     clock_sigma: Annotated[float, quantity("m", "of the clock that codes tell")] = 100.0
     drift_noise: Annotated[float, quantity("m/s", "walk of the clock's drift in 1 s")] = 0.1
-    system_noise: Annotated[float, quantity("m", "walk between systems' clocks in 1 s")] = 1e-3
+    system_noise: Annotated[float, quantity("m", "walk between systems' clocks in 1 s")] = 1e-4
     bias_sigma: Annotated[float, quantity("m", "of a bias between codes")] = 20.0
     bias_noise: Annotated[float, quantity("m", "walk of it in 1 s")] = 1e-4
 
@@ -111,7 +114,7 @@ class Ambiguities(Section, frozen=True):
 
     mode: Literal["float", "continuous", "fix-and-hold"] = "float"
     test: Literal["ratio", "w-ratio"] = "ratio"
-    threshold: Annotated[float, quantity("1", "of the test")] = 2.0
+    threshold: Annotated[float, quantity("1", "of the test")] = 3.0
     success: Annotated[float, quantity("1", "least bootstrapped success rate")] = 0.99
     mask: Annotated[float, quantity("rad", "elevation below which none is tried")] = 0.2618
     lock: int = 4

@@ -54,7 +54,7 @@ from replay.stages.inertial_columns import (
 )
 from replay.stages.inertial_settings import config_record, names_of, require_room
 from replay.stages.loose_config import Gnss, LooseConfig
-from replay.stages.ppp import ppp_config
+from replay.stages.ppp import clock_codes, ppp_config
 from replay.stages.ppp_columns import (
     PPP_EVENT_TEXT,
     bias_columns,
@@ -81,6 +81,7 @@ class PppInsState(HeldSamples):
 
     settings: PppInsConfig
     selection: Selection
+    codes: Selection | None
     config: Array
     own_config: Array
     ppp_config: Array
@@ -103,13 +104,14 @@ class PppInertial:
 
     spec = StageSpec(
         name="ppp-ins-tc",
-        version=1,
+        version=2,
         inputs=(
             Port(channels.IMU),
             Port(channels.GNSS_OBS),
             Port(channels.SATELLITES),
             Port(channels.CORRECTIONS),
             Port(channels.COARSE),
+            Port(channels.SIGNAL_BIAS, optional=True),
         ),
         outputs=(
             Port(channels.FILTER_INNOVATIONS),
@@ -141,6 +143,7 @@ class PppInertial:
         return PppInsState(
             settings=config,
             selection=select_signals(config.gnss.signals, config.gnss.systems),
+            codes=clock_codes(config, context),
             config=inertial,
             own_config=_own_config(config),
             ppp_config=ppp_config(config, context),
@@ -156,7 +159,7 @@ class PppInertial:
         """Take a block of inertial samples and epochs."""
         imu = block.get(channels.IMU.name)
         observations = block.get(channels.GNSS_OBS.name)
-        found = read_epochs(block, state.selection)
+        found = read_epochs(block, state.selection, codes=state.codes)
         if found is not None:
             state.epochs, state.rows = join_epochs(state.epochs, state.rows, found)
         if imu is not None:

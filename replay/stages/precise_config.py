@@ -20,6 +20,9 @@ class Products(Section, frozen=True):
     # Of orbit and clock together, where the products state none.
     range_std: Annotated[float, quantity("m", "of orbit and clock where not stated")] = 0.03
     biases: bool = True  # use biases of signals where the log has them
+    # Signals that the clocks are made of: where no biases are used, their codes replace others
+    # of their frequencies, whose phases stay.
+    clock_codes: tuple[str, ...] = ("G1W", "G2W")
     attitude: Literal["model", "nominal"] = "model"
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -344,7 +345,7 @@ def _settings_record(config: PreciseConfig) -> Array:
     record["broadcast"] = int(own.source == "broadcast")
     record["biases"] = int(own.biases)
     record["nominal"] = int(own.attitude == "nominal")
-    record["range_std"] = own.range_std
+    record["range_std"] = own.range_std * math.sqrt(0.5)  # each has half of the variance
     for name in terms.__struct_fields__:
         record[name] = int(getattr(terms, name))
     record["maps"] = int(config.atmosphere.ionosphere == "map")

@@ -195,10 +195,17 @@ def longest_gap(least_s: float, interval_s: float) -> float:
     return max(least_s, _INTERVALS * interval_s)
 
 
-def read_epochs(block: Block, selection: Selection, role: str = RECEIVER) -> Epochs | None:
-    """Epochs of one receiver in a block with what is known of them; None without any."""
+def read_epochs(
+    block: Block, selection: Selection, role: str = RECEIVER, codes: Selection | None = None
+) -> Epochs | None:
+    """Epochs of one receiver in a block with what is known of them; None without any.
+
+    Codes of `codes`, where it is given, replace others of their frequencies.
+    """
     observations, *known = (block.get(Port(channel, role).name) for channel in EPOCH_READS)
-    return None if observations is None else gather_epochs(observations, selection, *known)
+    if observations is None:
+        return None
+    return gather_epochs(observations, selection, *known, codes=codes)
 
 
 def join_epochs(epochs: Array, rows: Array, more: Epochs) -> tuple[Array, Array]:

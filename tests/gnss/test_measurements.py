@@ -71,6 +71,34 @@ def test_a_record_holds_metres():
     assert np.isnan(row["code"][1:]).all()
 
 
+def test_codes_of_clocks_replace_codes_and_nothing_else():
+    rows = [
+        (0, "E11", "1C", 2.4e7, 1.1e8, 10.0),
+        (0, "G05", "1C", 2.2e7, 1e8, -1500.0),
+        (0, "G05", "1W", 2.2e7 + 1.4, NAN, NAN),
+        (0, "G05", "2W", 2.2e7 + 3.0, 8e7, -1200.0),
+        (SECOND, "G05", "1C", 2.3e7, 1e8, -1500.0),  # without the clocks' code
+        (SECOND, "G07", "1C", NAN, 1e8, -1500.0),
+        (SECOND, "G07", "1W", 2.5e7, NAN, NAN),
+    ]
+    plain = gather_epochs(observations(rows), select_signals(SIGNALS, "GE"))
+    codes = select_signals(["G2W", "G1W"], "GE")  # slots are told apart by frequency
+    found = gather_epochs(observations(rows), select_signals(SIGNALS, "GE"), codes=codes)
+    satellites = [SATELLITE_NAMES[row["satellite"]].decode() for row in found.rows]
+    first, second = slice(0, 2), slice(2, 4)
+    assert sorted(satellites[first]) == ["E11", "G05"]
+    assert sorted(satellites[second]) == ["G05", "G07"]
+    values = dict(zip(satellites[first], found.rows["code"][first].tolist(), strict=True))
+    assert values["G05"][:2] == [2.2e7 + 1.4, 2.2e7 + 3.0]
+    assert values["E11"][0] == 2.4e7
+    values = dict(zip(satellites[second], found.rows["code"][second].tolist(), strict=True))
+    assert values["G05"][0] == 2.3e7
+    assert values["G07"][0] == 2.5e7
+    for name in found.rows.dtype.names:
+        if name != "code":
+            np.testing.assert_array_equal(found.rows[name], plain.rows[name])
+
+
 @pytest.mark.parametrize(
     ("tracked", "slots"),
     [

@@ -321,3 +321,35 @@ def test_the_covariance_says_how_far_off_it_is():
     mean = np.mean(total)
     # Standard deviation of the mean: sqrt(2 * 3 / 40) = 0.39.
     assert 3.0 - 3.0 * 0.39 < mean < 3.0 + 3.0 * 0.39
+
+
+def test_orbits_wrong_by_metres_leave_changes_of_position_right():
+    """What stays the same is in the ambiguities, and phases count as what they are."""
+    off = np.random.default_rng(5).normal(size=16) * 2.0
+    speed = np.array([0.4, -0.3, 0.2])
+    sky = Sky(interval=1.0, place=lambda t: PLACE + speed * t, phase_noise=0.002, wet=0.0)
+    sky.turn *= 0.0
+    epochs, rows = sky.epochs(range(60), code_error=lambda k, e, slot: off[k])
+    for k, (system, prn) in enumerate(sky.satellites):
+        rows["phase"][(rows["system"] == system) & (rows["prn"] == prn + 1)] += off[k]
+    config = settings(
+        dynamics=records.KINEMATIC, range_scale=1.0, range_usual=0.03, range_walk=2e-3,
+        ionosphere_noise=1e-4, wet_sigma=1e-3,
+    )  # fmt: skip
+    rows["range_std"] = 2.0
+    result = run(config, epochs, rows)
+    moved = result.solutions["r"] - result.solutions["r"][0]
+    truth = speed * np.arange(60)[:, None]
+    # Sixteen ionosphere-free phases of 6 mm each; the orbits' error itself stays.
+    assert np.sqrt(np.mean(np.diff(moved - truth, axis=0) ** 2)) < 0.01
+    assert np.linalg.norm(result.solutions["r"][-1] - PLACE - truth[-1]) > 0.1
+    # Codes alone would be as wrong as orbits, and are said to be.
+    codes = result.innovations[result.innovations["kind"] == 7]
+    phases = result.innovations[result.innovations["kind"] == 8]
+    assert np.all(codes["r"] > 1.97)
+    assert np.all(phases["r"] < 0.02)
+    # Where the products are as good as usual, nothing walks and nothing is added.
+    rows["range_std"] = 0.03
+    usual = run(config, epochs, rows)
+    config["range_walk"] = 1.0
+    assert np.array_equal(run(config, epochs, rows).P, usual.P)

@@ -7,10 +7,11 @@ import pytest
 
 from replay import channels, configuration
 from replay.gnss.measurements import SATELLITE_NAMES, gather_epochs, select_signals
-from replay.stages.base import Context
-from replay.stages.ppp import Ppp
+from replay.stages.base import Context, Port
+from replay.stages.ppp import Ppp, clock_codes
 from replay.stages.ppp_config import PppConfig
 from replay.stages.precise_satellites import PreciseSatellites
+from replay.stages.waiting import read_epochs
 from tests.stages.gnss_chain import COARSE, CORRECTIONS, OBS, SATELLITES, SOLUTION, logged, run
 from tests.stages.precise_logs import SIGNALS, folder_of, station_log
 
@@ -85,6 +86,33 @@ def test_a_station_stands_where_a_day_says(esbc):
     static = settings("esbc", {"ppp": {"motion": {"dynamics": "static"}}})
     solution = run(Ppp(), static, esbc).outputs[SOLUTION]
     assert np.abs(local(solution["position_ecef_m"][-1], ESBC)).max() < 0.05
+
+
+def test_codes_of_clocks_stand_in_before_corrections(esbc):
+    codes = clock_codes(settings("esbc"), Context({}, {}))
+    chosen = select_signals(SIGNALS["esbc"], "G")
+    plain, found = (read_epochs(esbc, chosen, codes=c).rows for c in (None, codes))
+    raw, taken = (gather_epochs(esbc[OBS], chosen, codes=c).rows for c in (None, codes))
+    bias = taken["code"][:, 0] - raw["code"][:, 0]
+    known = np.isfinite(bias)
+    assert known.sum() > 1000
+    # What is corrected is the same for both codes: their difference stays as it was received.
+    shift = found["code"][known, 0] - plain["code"][known, 0]
+    np.testing.assert_allclose(shift, bias[known], atol=2e-8)
+    names = found["satellite"][known]
+    each = [np.median(bias[known][names == number]) for number in np.unique(names)]
+    assert np.ptp(each) > 0.5  # biases of satellites, published as up to 2 ns each way
+
+
+def test_codes_stay_where_biases_are_known_or_clocks_are_broadcast(ccj2):
+    config = settings("esbc")
+    bias = Port(channels.SIGNAL_BIAS).name
+    assert clock_codes(config, Context({}, {})) is not None
+    assert clock_codes(config, Context({}, {bias: ccj2[CORRECTIONS]})) is None
+    unused = settings("esbc", {"products": {"biases": False}})
+    assert clock_codes(unused, Context({}, {bias: ccj2[CORRECTIONS]})) is not None
+    for table in ({"source": "broadcast"}, {"clock_codes": []}):
+        assert clock_codes(settings("esbc", {"products": table}), Context({}, {})) is None
 
 
 def test_without_biases_of_phases_nothing_is_fixed(esbc):
