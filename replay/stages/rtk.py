@@ -276,6 +276,12 @@ def rtk_config(config: RtkConfig | RtkInsConfig, single: Array, context: Context
             f"base.max_age is {base.max_age} s: a base that moves is not where it was",
             mend="--set base.max_age=1",
         )
+    if base.moving and motion.dynamics != "kinematic":
+        # A position about a base that jumps from epoch to epoch cannot be carried on.
+        raise ConfigurationError(
+            f"rtk.motion.dynamics is {motion.dynamics!r} and the base moves",
+            mend='--set rtk.motion.dynamics="kinematic", or say base.moving=false',
+        )
     record["mask"] = config.gnss.mask
     record["cn0_mask"] = config.gnss.cn0_mask
     record["excluded"] = single["excluded"]

@@ -265,7 +265,8 @@ def test_the_claim_follows_the_drifts(slower_by_cm: float, says: str) -> None:
     else:
         assert said.count("of 100 Hz lies within") == 2
         widest = max(abs(found[0].pair.low), abs(found[0].pair.high))
-        assert f"within {widest:.1f} cm of nought" in said
+        told = f"{widest:.1f} cm" if widest >= 1.0 else f"{10.0 * widest:.1f} mm"
+        assert f"within {told} of nought" in said
     assert "One seed tells nothing" in claim_said(all_runs(1), "unit")
 
 

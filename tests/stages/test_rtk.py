@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from replay import channels, configuration
+from replay.errors import ConfigurationError
 from replay.schemas import filter_pb2, sights_pb2, solution_pb2
 from replay.stages.base import BASE, RECEIVER, Context, Port
 from replay.stages.rtk import Rtk
@@ -400,3 +401,10 @@ def test_integers_are_fed_back_after_some_epochs():
     assert np.abs(miss).max() < 0.05
     assert rows["float_std_cycles"][last].max() < 0.05
     assert_integers(parts, sky, ("1C", "5Q"), truth)
+
+
+@pytest.mark.parametrize("dynamics", ["static", "velocity"])
+def test_a_position_about_a_base_that_moves_is_not_carried_on(dynamics):
+    settings = config(MovingBaseConfig, rtk={"motion": {"dynamics": dynamics}})
+    with pytest.raises(ConfigurationError, match="the base moves"):
+        Rtk().start(settings, Context({}, {}))

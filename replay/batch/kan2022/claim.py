@@ -125,8 +125,8 @@ def _more(item: Comparison) -> bool:
 def _rates(items: list[Comparison], does: str) -> str:
     if not items:
         return f"none of the rates is shown to {does}"
-    rates = " and ".join(f"{item.first.rate_hz} Hz" for item in items)
-    by = " and ".join(_size(abs(item.pair.mean)) for item in items)
+    rates = _listed([f"{item.first.rate_hz} Hz" for item in items])
+    by = _listed([_size(abs(item.pair.mean)) for item in items])
     return f"{rates} {does} (by {by})"
 
 
@@ -135,7 +135,7 @@ def _rest(items: list[Comparison]) -> str:
     bounds = [abs(v) for i in items for v in (i.pair.low, i.pair.high) if math.isfinite(v)]
     if not bounds:
         return ""
-    whose = " and ".join(f"{item.first.rate_hz} Hz" for item in items)
+    whose = _listed([f"{item.first.rate_hz} Hz" for item in items])
     return (
         f"; the mean difference of {whose} lies within {_size(max(bounds))} of nought (95 %),"
         " whichever its sign"
@@ -144,7 +144,14 @@ def _rest(items: list[Comparison]) -> str:
 
 def _size(value_cm: float) -> str:
     """A length as a person takes it in."""
-    return f"{value_cm:.1f} cm" if value_cm < _METRES_FROM_CM else f"{value_cm / 100.0:.1f} m"
+    if value_cm >= _METRES_FROM_CM:
+        return f"{value_cm / 100.0:.1f} m"
+    return f"{value_cm:.1f} cm" if value_cm >= 1.0 else f"{10.0 * value_cm:.1f} mm"
+
+
+def _listed(words: list[str]) -> str:
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _verdict(slower: dict[str, list[Comparison]], *, dropping_harms: bool) -> str:
