@@ -2,7 +2,7 @@
 
 Run from the root of the checkout: ``python -m tools.bench --only sweep [--quick]``. The cases are
 those of the study `kan2022` for one unit, cut short: simulated logs of the drive, PPP/INS at
-200 Hz and at 20 Hz, evaluated; whole processes, everything compiled before. The peer is the same
+four rates, evaluated; whole processes, everything compiled before. The peer is the same
 sweep with one process, so that the ratio is what two of them gain; 2 would be all of it.
 """
 
@@ -24,13 +24,13 @@ pipeline = ["ppp-ins-tc"]
 figures = ["position_error_all_m.*"]
 [grid]
 seed = [{seeds}]
-imu_rate = [200, 20]
+imu_rate = [200, 100, 50, 20]
 """
 
 
 def bench_sweep(*, quick: bool) -> list[Row]:
     """One process against two over the same cases."""
-    seeds = 2 if quick else 4
+    seeds = 1 if quick else 4
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         file = folder / "gain.toml"
@@ -43,7 +43,7 @@ def bench_sweep(*, quick: bool) -> list[Row]:
             run_replay(["sweep", str(file), "-o", str(folder / f"{jobs}"), "--jobs", f"{jobs}"])
             for jobs in (1, JOBS)
         )
-    cases = 2 * seeds
+    cases = 4 * seeds
     ratio = one.wall_s / two.wall_s
     return [
         Row(

@@ -20,6 +20,17 @@ from replay.errors import ExitCode, UsageError
 
 COPY: Final = "sweep.toml"
 _INPUTS: Final = ".inputs"
+# A run holds the interpreter for seconds and is one array after the other: no look at its stack
+# a hundred times a second, and freed pages stay with the process.
+_SETTINGS: Final = {
+    "distributed.admin.tick.limit": "1h",
+    "distributed.worker.profile.enabled": False,
+    "distributed.nanny.pre-spawn-environ": {
+        "OMP_NUM_THREADS": 1,
+        "MKL_NUM_THREADS": 1,
+        "OPENBLAS_NUM_THREADS": 1,
+    },
+}
 
 Told = Callable[[Case, Row], None]
 """Called with each case as it is done."""
@@ -255,7 +266,7 @@ def _client(options: Options) -> Iterator[Any]:
         return
     with (
         tempfile.TemporaryDirectory(prefix="replay-dask-") as scratch,
-        dask.config.set({"distributed.admin.tick.limit": "1h"}),
+        dask.config.set(_SETTINGS),
         library.LocalCluster(
             n_workers=1 if options.threads else options.jobs,
             threads_per_worker=options.jobs if options.threads else 1,
