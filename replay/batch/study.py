@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from replay.batch.workers import Workers
 from replay.configuration import parse_assignments
@@ -22,9 +22,6 @@ from replay.engine.run import replay_log
 from replay.errors import UsageError
 from replay.log.reader import LogReader
 from replay.simulate import simulate
-
-if TYPE_CHECKING:
-    from replay.batch.sweep_study import SweepStudy
 
 INPUT: Final = "input"
 
@@ -368,42 +365,3 @@ def discard_logs(logs: Mapping[str, Path]) -> None:
         for empty in (folder, folder.parent):
             if empty.is_dir() and not any(empty.iterdir()):
                 empty.rmdir()
-
-
-def find_study(name: str) -> Study | SweepStudy:
-    """Study of a name.
-
-    Raises
-    ------
-    UsageError
-        Where there is none.
-    """
-    if name not in STUDIES:
-        raise UsageError(f"no study {name!r}", mend=f"known: {', '.join(STUDIES)}")
-    return STUDIES[name]()
-
-
-def _lee2010() -> Study:
-    from replay.batch.lee2010.run import STUDY
-
-    return STUDY
-
-
-def _lee2010_degradation() -> Study:
-    from replay.batch.lee2010_degradation.run import STUDY
-
-    return STUDY
-
-
-def _kan2022() -> SweepStudy:
-    from replay.batch.kan2022.run import STUDY
-
-    return STUDY
-
-
-STUDIES: Final[dict[str, Callable[[], Study | SweepStudy]]] = {
-    "lee2010": _lee2010,
-    "lee2010-degradation": _lee2010_degradation,
-    "kan2022": _kan2022,
-}
-"""Studies by name; each is imported when it is asked for."""

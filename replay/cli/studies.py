@@ -42,7 +42,8 @@ def study(
 
     A study that is a sweep keeps a row of each run and goes on where it stopped.
     """
-    from replay.batch.study import STUDIES, Options, find_study
+    from replay.batch.studies import STUDIES, find_study
+    from replay.batch.study import Options
     from replay.batch.sweep_study import SweepStudy
 
     if name is None:

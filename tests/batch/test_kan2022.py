@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from replay.batch import study as studies
+from replay.batch import studies
 from replay.batch.kan2022 import published
 from replay.batch.kan2022.claim import claim_said, comparisons
 from replay.batch.kan2022.figures import drift_curves, figures_of, shown

@@ -22,9 +22,9 @@ from replay.batch.lee2010.tables import (
     position_table,
     success_table,
 )
+from replay.batch.studies import STUDIES, find_study
 from replay.batch.study import (
     INPUT,
-    STUDIES,
     Done,
     Measured,
     Member,
@@ -33,7 +33,6 @@ from replay.batch.study import (
     Variant,
     chosen_members,
     discard_logs,
-    find_study,
     run_study,
 )
 from replay.batch.sweep_study import SweepStudy
