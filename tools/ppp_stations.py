@@ -1,7 +1,7 @@
 """Precise point positioning of permanent stations, ours and RTKLIB's on the same files.
 
 Run: `python tools/ppp_stations.py [--station esbc] [--systems G GE GER] [--modes kinematic
-static] [--hours 24 6] [--no-ours] [--set key=value ...]`.
+static] [--hours 24 6] [--every 1] [--no-ours] [--set key=value ...]`.
 
 A station stands still. Of each set of systems, mode and session the table tells how east, north
 and up scatter about their own mean and are off from the reference, from the first hour on; the
@@ -147,14 +147,15 @@ class Report:
         self.starts: dict[tuple[str, str], list[tuple[Convergence | None, float]]] = {}
 
     def add(
-        self, program: str, setting: Setting, span: Span, first_ns: int, track: Track, place: Floats
-    ) -> None:
+        self, program: str, setting: Setting, span: Span, length: str, first_ns: int, track: Track,
+        place: Floats,
+    ) -> None:  # fmt: skip
         """One run of one session."""
         hours = [(t - first_ns) / HOUR_NS for t in span]
         session = f"{hours[0]:.0f} to {hours[1]:.1f} h"
         mode = setting.name.split()[1]
         length_s = (span[1] - span[0]) / NS_PER_S
-        starts = self.starts.setdefault((f"{program} {setting.name}", _hours(span)), [])
+        starts = self.starts.setdefault((f"{program} {setting.name}", length), [])
         if len(track.times_ns) == 0:
             self.table.add_row(program, setting.systems, mode, session, "0")
             starts.append((None, length_s))
@@ -182,7 +183,7 @@ class Report:
             f"{len(track.times_ns) / track.cpu_s:.0f}",
         )
         if setting.static:
-            key = (f"{program} {setting.systems}", _hours(span))
+            key = (f"{program} {setting.systems}", length)
             self.ends.setdefault(key, []).append(tuple(enu[-1]))
         for word, quality in (("float", FLOAT), ("fixed", FIXED)):
             rows = late & (track.quality == quality)
@@ -232,10 +233,6 @@ def minutes_held(starts: Sequence[tuple[Convergence | None, float]], axis: str) 
     ]
 
 
-def _hours(span: Span) -> str:
-    return f"{(span[1] - span[0]) / HOUR_NS:.0f} h"
-
-
 def _std(enu: Floats) -> Floats:
     return np.std(enu, axis=0)
 
@@ -248,13 +245,20 @@ def _rms(enu: Floats) -> Floats:
     return np.sqrt(np.mean(enu * enu, axis=0))
 
 
-def spans_of(first_ns: int, last_ns: int, hours: Sequence[int]) -> list[Span]:
-    """Sessions of given lengths, the last of each cut where the orbits end."""
-    found: dict[Span, None] = {}
+def spans_of(
+    first_ns: int, last_ns: int, hours: Sequence[float], every: float | None = None
+) -> dict[Span, str]:
+    """Sessions of given lengths, by which they are told, the last cut where the orbits end.
+
+    One begins where the one before it ends, or every so many hours.
+    """
+    found: dict[Span, str] = {}
     for length in hours:
-        for begin in range(first_ns, last_ns, length * HOUR_NS):
-            found[begin, min(begin + length * HOUR_NS - NS_PER_S, last_ns)] = None
-    return list(found)
+        length_ns = round(length * HOUR_NS)
+        step_ns = length_ns if every is None else round(every * HOUR_NS)
+        for begin in range(first_ns, last_ns, step_ns):
+            found.setdefault((begin, min(begin + length_ns - NS_PER_S, last_ns)), f"{length:g} h")
+    return found
 
 
 def bounds(log: Path, receiver: str) -> Span:
@@ -299,7 +303,8 @@ def measure(arguments: argparse.Namespace, station: str, scratch: Path, console:
         place, words = track.positions[-1], f"ours, {whole.name}, whole span"
     report = Report(f"{name}, mm; mean and rms from {np.round(place, 4)} m ({words})")
     warm = True
-    for span in spans_of(first, last, arguments.hours or HOURS[station]):
+    spans = spans_of(first, last, arguments.hours or HOURS[station], arguments.every)
+    for span, length in spans.items():
         part = scratch / "part.mcap"
         cut(log, station, span, part)
         for letters in systems:
@@ -308,7 +313,7 @@ def measure(arguments: argparse.Namespace, station: str, scratch: Path, console:
                 for program, peer in peers(setting, arguments.demo5):
                     track = theirs(files, peer, target, span)
                     if track is not None:
-                        report.add(program, setting, span, first, track, place)
+                        report.add(program, setting, span, length, first, track, place)
                 if arguments.no_ours:
                     continue
                 tables = our_tables(setting, arguments.set)
@@ -316,7 +321,7 @@ def measure(arguments: argparse.Namespace, station: str, scratch: Path, console:
                     run_ours(part, scratch / "out.mcap", station, tables)
                     warm = False
                 track = run_ours(part, scratch / "out.mcap", station, tables)
-                report.add("replay", setting, span, first, track, place)
+                report.add("replay", setting, span, length, first, track, place)
     console.print(report.table)
     console.print(report.repeatability())
     convergence = report.convergence()
@@ -348,7 +353,8 @@ def main() -> None:
     parser.add_argument("--systems", nargs="+", help="letters, as G GE GER")
     parser.add_argument("--modes", nargs="+", default=["kinematic", "static"],
                         choices=("kinematic", "static"))  # fmt: skip
-    parser.add_argument("--hours", type=int, nargs="+", help="lengths of sessions")
+    parser.add_argument("--hours", type=float, nargs="+", help="lengths of sessions")
+    parser.add_argument("--every", type=float, help="hours from one start to the next")
     parser.add_argument("--mask", type=float, default=10.0, help="degrees")
     parser.add_argument("--reference", type=float, nargs=3, help="ECEF, m")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the stations' folders")

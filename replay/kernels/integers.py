@@ -11,6 +11,7 @@ from numba import njit
 
 from replay.kernels.ambiguity import OK, bootstrapped_success
 from replay.kernels.ambiguity_search import resolve, resolve_partial, w_ratio
+from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import SATELLITES, SLOTS
 from replay.kernels.kalman import scalar_update
 from replay.kernels.rtk_records import PARTIAL_SUCCESS, TEST_W_RATIO
@@ -54,6 +55,7 @@ DONE: Final = -2
 _ALL_AGAIN: Final = -1
 
 _NODES: Final = 20_000
+_APART_SIGMAS: Final = 4.0
 _LARGEST_RATIO: Final = 9999.9
 
 
@@ -317,6 +319,37 @@ def keep_integers(candidates: Array, count: int, s: Record) -> None:
         s["known"][c["satellite"], c["slot"]] = 1
         s["integer"][c["reference"], c["slot"]] = 0
         s["known"][c["reference"], c["slot"]] = 1
+
+
+@njit(cache=True)
+def near_float(tried: Record, x: Array, P: Array, cfg: Record) -> bool:
+    """Whether the position given the integers is one that the float one allows."""
+    for c in range(3):
+        spread = P[c, c] - tried["cov"][c, c]
+        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
+        if not abs(tried["x"][c] - x[c]) <= limit:
+            return False
+    return True
+
+
+@njit(cache=True)
+def prove(candidates: Array, count: int, s: Record, cfg: Record, first: int) -> bool:
+    """Compare integers with those before and keep them; False where proven ones outweigh them.
+
+    Like ones add to the proof. Others begin with a proof of `first`, where what was before is
+    not proven or was doubted often enough in a row.
+    """
+    if same_integers(candidates, count, s):
+        s["doubt"] = 0
+        s["proof"] += 1
+    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
+        s["doubt"] += 1
+        return False
+    else:
+        s["doubt"] = 0
+        s["proof"] = first
+    keep_integers(candidates, count, s)
+    return True
 
 
 @njit(cache=True)

@@ -26,7 +26,7 @@ from replay.kernels.ppp_records import (
     VELOCITY,
     VIEWS,
 )
-from replay.kernels.ppp_states import SECOND, ionosphere_factor, range_variance
+from replay.kernels.ppp_states import SECOND, excess_variance, ionosphere_factor
 from replay.kernels.single_solve import predicted_range_rate
 from replay.kernels.types import Array, Record
 from replay.kernels.weighting import noise_factor
@@ -223,7 +223,7 @@ def _single(
         return 0
     if kind == CODE:
         r = _variance(row, slot, cfg["code_sigma"][slot], cfg["code_scale"][system], cfg)
-        r += range_variance(row, cfg)
+        r += excess_variance(row, cfg)
     else:
         r = _variance(row, slot, cfg["phase_sigma"][slot], cfg["phase_scale"][system], cfg)
     _open(m, kind, v, slot, sat, value, r)
@@ -263,7 +263,7 @@ def _combined(
     a, b = g1 / (g1 - g0), -g0 / (g1 - g0)
     r = a * a * _variance(row, 0, s0, scale, cfg) + b * b * _variance(row, SECOND, s1, scale, cfg)
     if kind == CODE:
-        r += range_variance(row, cfg)
+        r += excess_variance(row, cfg)
     _open(m, kind, v, 0, sat, a * p0 + b * p1, r)
     _shared(m, view, row, slopes, s, x)
     if kind == PHASE:

@@ -12,16 +12,15 @@ import numpy as np
 from numba import njit
 
 from replay.kernels.ambiguity import COUNT_LIMIT
-from replay.kernels.elementary import sqrt
 from replay.kernels.gnss_records import GLONASS, SATELLITES, SLOTS, SYSTEMS
 from replay.kernels.integers import (
     DONE,
     clear_attempt,
     difference_floats,
     hold,
-    keep_integers,
+    near_float,
     next_try,
-    same_integers,
+    prove,
     search_integers,
 )
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
@@ -33,7 +32,6 @@ from replay.kernels.types import Array, Record
 
 # Cycles: a phase whose own deviation is more tells no integer.
 _BLUR = 0.25
-_APART_SIGMAS = 4.0
 
 
 @njit(cache=True)
@@ -230,26 +228,11 @@ def believe(
     candidates: Array, count: int, s: Record, cfg: Record, tried: Record, x: Array, P: Array
 ) -> bool:
     """Whether integers that passed the test of the search agree with all else."""
-    if tried["passed"] == 0:
+    if tried["passed"] == 0 or not near_float(tried, x, P, cfg):
         return False
-    for c in range(3):
-        spread = P[c, c] - tried["cov"][c, c]
-        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
-        if not abs(tried["x"][c] - x[c]) <= limit:
-            return False
     if tried["whole"] == 0:
         return True
-    if same_integers(candidates, count, s):
-        s["doubt"] = 0
-        s["proof"] += 1
-    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
-        s["doubt"] += 1
-        return False
-    else:
-        s["doubt"] = 0
-        s["proof"] = 1
-    keep_integers(candidates, count, s)
-    return bool(s["proof"] >= cfg["agree"])
+    return prove(candidates, count, s, cfg, 1) and bool(s["proof"] >= cfg["agree"])
 
 
 @njit(cache=True)

@@ -41,7 +41,7 @@ def ionosphere_factor(frequency: float) -> float:
 
 
 @njit(cache=True)
-def range_variance(row: Record, cfg: Record) -> float:
+def excess_variance(row: Record, cfg: Record) -> float:
     """What orbit and clock add to a code (m^2), where they deviate more than usual.
 
     They are wrong by nearly the same from one epoch to the next, and by the same on all
@@ -335,7 +335,7 @@ def _ambiguities(
             grow[n] = cfg["ambiguity_noise"] * cfg["ambiguity_noise"] * dt
             if v >= 0:
                 walk = cfg["range_walk"] * cfg["range_walk"]
-                grow[n] += walk * range_variance(rows[views[v]["rover"]], cfg) * dt
+                grow[n] += walk * excess_variance(rows[views[v]["rover"]], cfg) * dt
             s["amb"][sat, slot] = n
             if here:
                 s["used_t"][sat, slot] = t

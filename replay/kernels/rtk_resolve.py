@@ -18,9 +18,9 @@ from replay.kernels.integers import (
     clear_attempt,
     difference_floats,
     hold,
-    keep_integers,
+    near_float,
     next_try,
-    same_integers,
+    prove,
     search_integers,
 )
 from replay.kernels.orbits import SPEED_OF_LIGHT_M_S
@@ -31,7 +31,6 @@ from replay.kernels.types import Array, Record
 
 # Cycles: a phase whose own deviation is more tells no integer.
 _BLUR: Final = 0.25
-_APART_SIGMAS: Final = 4.0
 
 
 @njit(cache=True)
@@ -222,14 +221,10 @@ def believe(
     x: Array, P: Array, before: Array, base_x: Array,
 ) -> bool:  # fmt: skip
     """Whether integers that passed the test of the search agree with all else."""
-    if tried["passed"] == 0:
+    if tried["passed"] == 0 or not near_float(tried, x, P, cfg):
         return False
     step = np.zeros(3)
     for c in range(3):
-        spread = P[c, c] - tried["cov"][c, c]
-        limit = cfg["apart"] + _APART_SIGMAS * sqrt(spread if spread > 0.0 else 0.0)
-        if not abs(tried["x"][c] - x[c]) <= limit:
-            return False
         step[c] = tried["x"][c] - before[c]
     if cfg["length"] > 0.0:
         length2 = 0.0
@@ -243,17 +238,7 @@ def believe(
         unit = fixed_unit_weight(measures, candidates, count, before, step)
         if unit > cfg["unit_weight"]:
             return False
-    if same_integers(candidates, count, s):
-        s["doubt"] = 0
-        s["proof"] += 1
-    elif s["proof"] >= cfg["proven"] and s["doubt"] < cfg["confirm"]:
-        s["doubt"] += 1
-        return False
-    else:
-        s["doubt"] = 0
-        s["proof"] = 0
-    keep_integers(candidates, count, s)
-    return True
+    return prove(candidates, count, s, cfg, 0)
 
 
 @njit(cache=True)

@@ -109,6 +109,28 @@ def symmetric(A: Array, n: int) -> None:
 
 
 @njit(cache=True)
+def forward_vector(U: Array, n: int, scale: Array, x: Array) -> None:
+    """L^-1 x in place, where `factor` gave U of L' and `scale`."""
+    for a in range(n):
+        total = scale[a] * x[a]
+        for b in range(a):
+            total -= U[b, a] * x[b]
+        x[a] = total * U[a, a]
+
+
+@njit(cache=True)
+def backward_vector(U: Array, n: int, scale: Array, x: Array) -> None:
+    """L'^-1 x in place."""
+    for a in range(n - 1, -1, -1):
+        total = x[a]
+        for b in range(a + 1, n):
+            total -= U[a, b] * x[b]
+        x[a] = total * U[a, a]
+    for a in range(n):
+        x[a] *= scale[a]
+
+
+@njit(cache=True)
 def measured_information(
     n: int, prior: Array, P: Array, dx: Array, J: Array, j: Array, room: tuple[Array, ...]
 ) -> None:
@@ -134,10 +156,8 @@ def measured_information(
     forward_solve(U, n, scale, W, False, y)
     symmetric(W, n)
     for a in range(n):
-        total = scale[a] * dx[a]
-        for b in range(a):
-            total -= U[b, a] * j[b]
-        j[a] = total * U[a, a]
+        j[a] = dx[a]
+    forward_vector(U, n, scale, j)
     # The inverse of C through its own factor; what is a function of other states stays nought.
     for a in range(n):
         for b in range(n):
@@ -158,13 +178,7 @@ def measured_information(
         for b in range(n):
             J[a, b] *= scale[a]
     symmetric(J, n)
-    for a in range(n - 1, -1, -1):
-        total = j[a]
-        for b in range(a + 1, n):
-            total -= U[a, b] * j[b]
-        j[a] = total * U[a, a]
-    for a in range(n):
-        j[a] *= scale[a]
+    backward_vector(U, n, scale, j)
 
 
 @njit(cache=True)
@@ -177,18 +191,8 @@ def _solve_factored(n: int, C: Array, X: Array, x: Array, F: Array, y: Array) ->
     for a in range(n):
         for b in range(n):
             X[a, b] *= scale[a]
-    for a in range(n):
-        total = scale[a] * x[a]
-        for b in range(a):
-            total -= F[b, a] * x[b]
-        x[a] = total * F[a, a]
-    for a in range(n - 1, -1, -1):
-        total = x[a]
-        for b in range(a + 1, n):
-            total -= F[a, b] * x[b]
-        x[a] = total * F[a, a]
-    for a in range(n):
-        x[a] *= scale[a]
+    forward_vector(F, n, scale, x)
+    backward_vector(F, n, scale, x)
 
 
 @njit(cache=True)

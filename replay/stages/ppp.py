@@ -19,10 +19,7 @@ from replay.gnss.measurements import Epochs, Selection, select_signals
 from replay.kernels import ppp, ppp_output, ppp_records
 from replay.kernels.gnss_records import BEIDOU, FIRST, SLOTS, SYSTEMS
 from replay.kernels.least_squares import SOLVE_DTYPE
-from replay.kernels.rtk_records import AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE
-from replay.kernels.sights import NOTE_DTYPE
 from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
-from replay.log.columns import Columns
 from replay.stages.base import (
     Block,
     Context,
@@ -39,15 +36,8 @@ from replay.stages.gnss_columns import (
     geometry_columns,
     residual_columns,
 )
-from replay.stages.ppp_columns import (
-    PPP_EVENT_TEXT,
-    bias_columns,
-    phase_columns,
-    slant_columns,
-    zenith_columns,
-)
+from replay.stages.ppp_columns import PPP_EVENT_TEXT, new_precise_rows, precise_columns
 from replay.stages.ppp_config import PppConfig
-from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
 from replay.stages.spp import excluded_satellites
 from replay.stages.spp_config import WEIGHTINGS
 from replay.stages.state_names import name_of
@@ -149,59 +139,39 @@ class Ppp:
             lambda nodes: self._filter(state, found, nodes),
             state.kernel, state.x, state.P, recorder.trail,
         )  # fmt: skip
-        solutions, innovations, ambiguities, resolutions, notes = made[:5]
-        zeniths, slants, biases, phases, counts = made[5:]
+        solutions, innovations, own = made[0], made[1], made[2:]
+        notes, counts = own[2], own[-1]
         solutions = solutions[: counts[ppp_output.SOLUTIONS]]
-        columns: dict[channels.ChannelSpec, Columns] = {
-            channels.FILTER_INNOVATIONS: residual_columns(
+        columns = {
+            channels.FILTER_INNOVATIONS.name: residual_columns(
                 innovations[: counts[ppp_output.INNOVATIONS]]
             ),
-            channels.FILTER_CLOCKS: clock_columns(solutions),
-            channels.FILTER_GEOMETRY: geometry_columns(solutions),
-            channels.FILTER_TROPOSPHERE: zenith_columns(zeniths[: counts[ppp_output.ZENITHS]]),
-            channels.FILTER_IONOSPHERE: slant_columns(slants[: counts[ppp_output.SLANTS]]),
-            channels.FILTER_BIASES: bias_columns(biases[: counts[ppp_output.BIASES]]),
-            channels.FILTER_PHASES: phase_columns(phases[: counts[ppp_output.PHASES]]),
-            channels.FILTER_AMBIGUITIES: ambiguity_columns(
-                ambiguities[: counts[ppp_output.AMBIGUITIES]]
-            ),
-            channels.FILTER_RESOLUTION: resolution_columns(
-                resolutions[: counts[ppp_output.RESOLUTIONS]]
-            ),
-            channels.FILTER_EVENTS: event_columns(
+            channels.FILTER_CLOCKS.name: clock_columns(solutions),
+            channels.FILTER_GEOMETRY.name: geometry_columns(solutions),
+            **precise_columns(own),
+            channels.FILTER_EVENTS.name: event_columns(
                 notes[: counts[ppp_output.NOTES]], PPP_EVENT_TEXT
             ),
-            channels.SOLUTION: antenna_solution_columns(solutions),
+            channels.SOLUTION.name: antenna_solution_columns(solutions),
+            **recorder.outputs(),
         }
-        said = {channel.name: rows for channel, rows in columns.items()}
-        said.update(recorder.outputs())
-        return state, {name: rows for name, rows in said.items() if len(rows)}
+        return state, {name: rows for name, rows in columns.items() if len(rows)}
 
     @staticmethod
     def _filter(state: PppState, found: Epochs, nodes: Nodes) -> tuple[Array, ...]:
-        """The compiled loop over a block: outputs and their counts."""
+        """The compiled loop over a block: solutions, innovations, and the rest with its counts."""
         epochs, rows = len(found.epochs), len(found.rows)
         solutions = np.zeros(epochs, dtype=SINGLE_ROW_DTYPE)
         innovations = np.zeros((2 * SLOTS + 2) * rows, dtype=RESIDUAL_DTYPE)
-        ambiguities = np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE)
-        resolutions = np.zeros(epochs, dtype=RESOLUTION_ROW_DTYPE)
-        # Per epoch a jump of the clock, too few satellites or a reset, a fix or its loss;
-        # breaks of ambiguities whose satellite may be out of view.
-        notes = np.zeros((5 + ppp_records.ROOM) * epochs, dtype=NOTE_DTYPE)
-        zeniths = np.zeros(epochs, dtype=ppp_records.ZENITH_ROW_DTYPE)
-        slants = np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE)
-        biases = np.zeros(SYSTEMS * SLOTS * epochs, dtype=ppp_records.BIAS_ROW_DTYPE)
-        phases = np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE)
-        counts = np.zeros(ppp_output.COUNTS, dtype=np.int64)
+        # Per epoch a jump of the clock, too few satellites or a reset, a fix or its loss.
+        own = new_precise_rows(epochs, rows, notes=5)
+        ambiguities, resolutions, notes, zeniths, slants, biases, phases, counts = own
         ppp.run_ppp(
             state.kernel, state.x, state.P, state.config, np.zeros(1, dtype=SOLVE_DTYPE),
             found.epochs, found.rows, solutions, innovations, ambiguities, resolutions, notes,
             zeniths, slants, biases, phases, counts, state.recorder.trail, nodes,
         )  # fmt: skip
-        return (
-            *(solutions, innovations, ambiguities, resolutions, notes),
-            *(zeniths, slants, biases, phases, counts),
-        )
+        return (solutions, innovations, *own)
 
     def finish(self, state: PppState) -> Outputs:
         """Nothing is left to say."""

@@ -6,10 +6,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from replay import channels
 from replay.gnss.measurements import SATELLITE_NAMES, signal_names
-from replay.kernels import ppp_records
-from replay.kernels.gnss_records import SYSTEM_LETTERS
+from replay.kernels import ppp_output, ppp_records
+from replay.kernels.gnss_records import SLOTS, SYSTEM_LETTERS, SYSTEMS
+from replay.kernels.rtk_records import AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE
+from replay.kernels.sights import NOTE_DTYPE
 from replay.log.columns import Columns, Ragged
+from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
 
 Array = np.ndarray[Any, Any]
 
@@ -70,3 +74,48 @@ def phase_columns(rows: Array) -> Columns:
         "epoch_count": rows["age"].astype(np.uint32),
     }
     return Columns.build(rows["t"], values, log_time_ns=rows["log_t"])
+
+
+def new_precise_rows(epochs: int, rows: int, notes: int) -> tuple[Array, ...]:
+    """Room for what a block gives beside solutions and innovations, as the kernels take it.
+
+    Parameters
+    ----------
+    epochs, rows : int
+        Of the block.
+    notes : int
+        Events of an epoch, at most, beside breaks of ambiguities, in view or not.
+
+    Returns
+    -------
+    tuple of array
+        Ambiguities, resolutions, notes, zenith delays, slant delays, biases, phases, counts.
+    """
+    return (
+        np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE),
+        np.zeros(epochs, dtype=RESOLUTION_ROW_DTYPE),
+        np.zeros((notes + ppp_records.ROOM) * epochs, dtype=NOTE_DTYPE),
+        np.zeros(epochs, dtype=ppp_records.ZENITH_ROW_DTYPE),
+        np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE),
+        np.zeros(SYSTEMS * SLOTS * epochs, dtype=ppp_records.BIAS_ROW_DTYPE),
+        np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE),
+        np.zeros(ppp_output.COUNTS, dtype=np.int64),
+    )
+
+
+def precise_columns(made: tuple[Array, ...]) -> dict[str, Columns]:
+    """Columns of :func:`new_precise_rows` once filled; notes are the filter's own to tell."""
+    ambiguities, resolutions, _, zeniths, slants, biases, phases, counts = made
+    columns = {
+        channels.FILTER_TROPOSPHERE: zenith_columns(zeniths[: counts[ppp_output.ZENITHS]]),
+        channels.FILTER_IONOSPHERE: slant_columns(slants[: counts[ppp_output.SLANTS]]),
+        channels.FILTER_BIASES: bias_columns(biases[: counts[ppp_output.BIASES]]),
+        channels.FILTER_PHASES: phase_columns(phases[: counts[ppp_output.PHASES]]),
+        channels.FILTER_AMBIGUITIES: ambiguity_columns(
+            ambiguities[: counts[ppp_output.AMBIGUITIES]]
+        ),
+        channels.FILTER_RESOLUTION: resolution_columns(
+            resolutions[: counts[ppp_output.RESOLUTIONS]]
+        ),
+    }
+    return {channel.name: rows for channel, rows in columns.items()}

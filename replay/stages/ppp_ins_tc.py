@@ -27,11 +27,8 @@ from replay.kernels.gnss_records import (
     EPOCH_DTYPE,
     MEASURED_DTYPE,
     SLOTS,
-    SYSTEMS,
 )
 from replay.kernels.least_squares import SOLVE_DTYPE
-from replay.kernels.rtk_records import AMBIGUITY_ROW_DTYPE, RESOLUTION_ROW_DTYPE
-from replay.kernels.sights import NOTE_DTYPE
 from replay.kernels.single_records import RESIDUAL_DTYPE, SINGLE_ROW_DTYPE
 from replay.stages.base import (
     Block,
@@ -55,15 +52,8 @@ from replay.stages.inertial_columns import (
 from replay.stages.inertial_settings import config_record, names_of, require_room
 from replay.stages.loose_config import Gnss, LooseConfig
 from replay.stages.ppp import clock_codes, ppp_config
-from replay.stages.ppp_columns import (
-    PPP_EVENT_TEXT,
-    bias_columns,
-    phase_columns,
-    slant_columns,
-    zenith_columns,
-)
+from replay.stages.ppp_columns import PPP_EVENT_TEXT, new_precise_rows, precise_columns
 from replay.stages.ppp_ins_config import PppInsConfig
-from replay.stages.rtk_columns import ambiguity_columns, resolution_columns
 from replay.stages.state_names import name_of
 from replay.stages.transitions import Nodes, Recorder, recording
 from replay.stages.waiting import SAMPLE_TYPES, HeldSamples, forget_epochs, join_epochs, read_epochs
@@ -191,8 +181,8 @@ class PppInertial:
             state.filter, state.own, state.kernel, recorder.trail,
         )  # fmt: skip
         solutions, epochs, covariances, innovations, events, counts, _ = out[:7]
-        geometry, residuals, ambiguities, resolutions, notes = out[7:12]
-        zeniths, slants, biases, phases, tally = out[12:]
+        geometry, residuals, own = out[7], out[8], out[9:]
+        notes, tally = own[2], own[-1]
         require_room(int(counts[4]), self.spec.name)
         state.release(ready)
         state.epochs, state.rows = forget_epochs(state.epochs, state.rows, taken)
@@ -204,16 +194,7 @@ class PppInertial:
             ),
             channels.FILTER_CLOCKS.name: clock_columns(geometry),
             channels.FILTER_GEOMETRY.name: geometry_columns(geometry),
-            channels.FILTER_TROPOSPHERE.name: zenith_columns(zeniths[: tally[ppp_output.ZENITHS]]),
-            channels.FILTER_IONOSPHERE.name: slant_columns(slants[: tally[ppp_output.SLANTS]]),
-            channels.FILTER_BIASES.name: bias_columns(biases[: tally[ppp_output.BIASES]]),
-            channels.FILTER_PHASES.name: phase_columns(phases[: tally[ppp_output.PHASES]]),
-            channels.FILTER_AMBIGUITIES.name: ambiguity_columns(
-                ambiguities[: tally[ppp_output.AMBIGUITIES]]
-            ),
-            channels.FILTER_RESOLUTION.name: resolution_columns(
-                resolutions[: tally[ppp_output.RESOLUTIONS]]
-            ),
+            **precise_columns(own),
             channels.FILTER_STATE.name: state_columns(epochs),
             channels.FILTER_COVARIANCE.name: covariance_columns(
                 epochs, covariances[: counts[1]], names
@@ -244,15 +225,8 @@ class PppInertial:
             nodes,
             np.zeros(count, dtype=SINGLE_ROW_DTYPE),
             np.zeros((3 * SLOTS + 1) * rows, dtype=RESIDUAL_DTYPE),
-            np.zeros(SLOTS * rows, dtype=AMBIGUITY_ROW_DTYPE),
-            np.zeros(count, dtype=RESOLUTION_ROW_DTYPE),
-            # Per epoch a fix or its loss, a reset, and breaks of ambiguities, in view or not.
-            np.zeros((3 + ppp_records.ROOM) * count, dtype=NOTE_DTYPE),
-            np.zeros(count, dtype=ppp_records.ZENITH_ROW_DTYPE),
-            np.zeros(rows, dtype=ppp_records.SLANT_ROW_DTYPE),
-            np.zeros(SYSTEMS * SLOTS * count, dtype=ppp_records.BIAS_ROW_DTYPE),
-            np.zeros(SLOTS * rows, dtype=ppp_records.PHASE_ROW_DTYPE),
-            np.zeros(ppp_output.COUNTS, dtype=np.int64),
+            # Per epoch a fix or its loss, a reset.
+            *new_precise_rows(count, rows, notes=3),
         )
         work = state.recorder.lend(np.zeros(1, dtype=records.work_dtype(_STATES)))
         taken = tight_ppp.run_tight_ppp(

@@ -121,16 +121,20 @@ class Smoother:
         errors = Ragged(found.error_starts, found.errors).take(said)
         covariances = Ragged(found.covariance_starts, found.covariances).take(said)
         shown = found.shown[said]
-        rows, q = _solutions(at, own_rows, errors, covariances, shown)
-        outputs: Outputs = {}
         numbers, lists = _names(at)
-        absolute = np.array([not is_relative(names) for names in lists], dtype=np.bool_)[numbers]
+        moving = _of_names(
+            [len(n) > _POSITION and n[_POSITION] == "velocity_ecef_x" for n in lists], numbers
+        )
+        scaled = _of_names(["gyro_scale_x" in n for n in lists], numbers)
+        absolute = _of_names([not is_relative(n) for n in lists], numbers)
+        rows, q = _solutions(at, own_rows, errors, covariances, shown, moving, scaled)
+        outputs: Outputs = {}
         if channels.RELATIVE_POSITION.name in {port.channel.name for port in self.spec.outputs}:
             outputs[channels.RELATIVE_POSITION.name] = smoothed_baselines(
                 at, _own(at, block.get(channels.RELATIVE_POSITION.name), "relative position"),
                 own_rows, errors, covariances, shown, absolute,
             )  # fmt: skip
-        solutions = _solution_columns(at, own_rows, rows)
+        solutions = _solution_columns(at, own_rows, rows, moving)
         if not absolute.all():
             solutions = solutions.take(np.flatnonzero(absolute))
         if len(solutions):
@@ -153,8 +157,8 @@ class Smoother:
             )
             if states is not None:
                 outputs[channels.FILTER_STATE.name] = _states(
-                    at.take(whole_rows), states, rows[whole_rows], q[whole_rows],
-                    errors.take(whole_rows),
+                    at.take(whole_rows), numbers[whole_rows], lists, states,
+                    rows[whole_rows], q[whole_rows], errors.take(whole_rows),
                 )  # fmt: skip
         return state, outputs
 
@@ -227,32 +231,30 @@ def _names(nodes: Columns) -> tuple[Array, list[tuple[str, ...]]]:
     return numbers, [tuple(text.decode().split(",")) for text in known]
 
 
+def _of_names(marks: list[bool], numbers: Array) -> Array:
+    """What is marked of each list of names, as a mark of each node."""
+    return np.array(marks, dtype=np.bool_)[numbers]
+
+
 def _solutions(
-    nodes: Columns, own: Columns, errors: Ragged, covariances: Ragged, shown: Array
-) -> tuple[Array, Array]:
+    nodes: Columns, own: Columns, errors: Ragged, covariances: Ragged, shown: Array,
+    moving: Array, scaled: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Records of SOLUTION_DTYPE, and attitudes (nodes, 4), body to ECEF."""
     rows = np.zeros(len(nodes), dtype=records.SOLUTION_DTYPE)
     q = np.zeros((len(nodes), 4))
-    numbers, lists = _names(nodes)
-    moving = [len(n) > _POSITION and n[_POSITION] == "velocity_ecef_x" for n in lists]
-    scaled = ["gyro_scale_x" in n for n in lists]
     rates = np.nan_to_num(own["angular_rate_body_rad_s"].astype(np.float64))
     estimates, attitudes = nodes.ragged("estimate"), nodes.ragged("q_body_to_ecef")
     smoothed_solutions(
         (estimates.offsets, estimates.values), (attitudes.offsets, attitudes.values),
         (errors.offsets, errors.values), (covariances.offsets, covariances.values), shown,
-        np.array(moving, dtype=np.int64)[numbers], np.array(scaled, dtype=np.int64)[numbers],
-        np.ascontiguousarray(rates), q, rows,
+        moving.astype(np.int64), scaled.astype(np.int64), np.ascontiguousarray(rates), q, rows,
     )  # fmt: skip
     return rows, q
 
 
-def _solution_columns(nodes: Columns, own: Columns, rows: Array) -> Columns:
+def _solution_columns(nodes: Columns, own: Columns, rows: Array, moving: Array) -> Columns:
     """Solutions with the run's own status, times and presence of fields."""
-    numbers, lists = _names(nodes)
-    moving = np.array(
-        [len(n) > _POSITION and n[_POSITION] == "velocity_ecef_x" for n in lists], dtype=np.bool_
-    )[numbers]
     turning = np.diff(nodes.ragged("q_body_to_ecef").offsets) > 0
     status = own["status"].astype(np.int32)
     status[nodes["solution"] == GIVEN_INTEGERS] = solution_pb2.SOLUTION_STATUS_FLOAT
@@ -281,14 +283,16 @@ def _solution_columns(nodes: Columns, own: Columns, rows: Array) -> Columns:
     )
 
 
-def _states(nodes: Columns, states: Columns, rows: Array, q: Array, errors: Ragged) -> Columns:
+def _states(
+    nodes: Columns, numbers: Array, lists: list[tuple[str, ...]], states: Columns, rows: Array,
+    q: Array, errors: Ragged,
+) -> Columns:  # fmt: skip
     """The filter's states less what the smoother found wrong with them."""
     place = np.searchsorted(states.valid_time_ns, nodes.valid_time_ns, side="left")
     chosen = states.take(place.astype(np.int64))
     values: dict[str, Array] = {name: np.array(chosen[name]) for name in chosen.values}
     values["position_ecef_m"] = np.ascontiguousarray(rows["r"])
     values["q_body_to_ecef"] = q
-    numbers, lists = _names(nodes)
     begins = errors.offsets[:-1]
     for number, names in enumerate(lists):
         at = np.flatnonzero(numbers == number)
